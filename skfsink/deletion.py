@@ -1,0 +1,27 @@
+"""Failed elements: deleted when the relative density is spent at every Gauss point (Sec. 4)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .space import Space
+from .state import State
+
+__all__ = ["delete_failed"]
+
+
+def delete_failed(space: Space, state: State, threshold: float, failure_energy: float) -> np.ndarray:
+    """Mark the elements that failed since the last accepted state; returns their numbers, ascending.
+
+    An element fails when gamma <= `threshold` at all its Gauss points. It is logged with the time, and its area
+    (volume) times psi_f is added to U (Eq. 30). Call it on accepted states only: a trial that is given up must not
+    leave holes.
+    """
+    candidates = np.flatnonzero(~state.deleted & (state.gamma[space.conn].min(axis=1) <= threshold))
+    gamma = state.gamma[space.conn[candidates]] @ space.N.T
+    failed = candidates[(gamma <= threshold).all(axis=1)]
+    if failed.size:
+        state.deleted[failed] = True
+        state.deletions.extend((state.time, int(e)) for e in failed)
+        state.ledger.paper += failure_energy * float(space.V[failed].sum())
+    return failed

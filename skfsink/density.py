@@ -1,0 +1,126 @@
+"""The relative density: history of the stored energy, and the solve of the mass balance for gamma (Eq. 6-10, 20-24).
+
+    int l^2 Grad gamma . Grad dgamma + gamma dgamma/(H + eps) = int dgamma
+
+With `sink="lumped"` (the default) the sink term is lumped by row sums: the matrix is an M-matrix wherever the
+Laplacian's off-diagonals are not positive, and then 0 < gamma <= 1. "consistent" is the paper's form, whose sink
+varies by 1e15 inside an element: gamma dips below zero next to a crack and conjugate gradients stall, so it is
+factorised. "nearest" gives each Gauss point to the node next to it.
+"""
+
+from __future__ import annotations
+
+import logging
+
+import numpy as np
+
+from . import kernels
+from .errors import ConvergenceError, ParameterError
+from .linalg import AmgCG, Factorization
+from .material import SinkLaw
+from .space import Pattern, Space
+
+__all__ = ["SINKS", "DensitySolver"]
+
+SINKS = ("lumped", "consistent", "nearest")
+log = logging.getLogger(__name__)
+
+
+class DensitySolver:
+    """Solves for the nodal gamma, given the greatest stored energy W each Gauss point has seen.
+
+    Parameters
+    ----------
+    space: the spaces.
+    law: sink and flux parameters.
+    sink: one of `SINKS`.
+    unchanged: a solve is left out when no sink coefficient moved by more than this, relatively, since the last one.
+
+    Attributes
+    ----------
+    solves, skipped: how often it was solved, and left out because H had not changed.
+    iterations: conjugate-gradient iterations so far.
+    fallbacks: solves in which AMG-CG did not converge and the matrix was factorised instead.
+    """
+
+    def __init__(self, space: Space, law: SinkLaw, sink: str = "lumped", tolerance: float = 1e-8,
+                 unchanged: float = 1e-12) -> None:
+        if sink not in SINKS:
+            raise ParameterError(f"sink must be one of {', '.join(SINKS)}; got {sink!r}")
+        self.space, self.law, self.sink = space, law, sink
+        self.unchanged = unchanged
+        self.pattern = Pattern(space)
+        self.load = space.lump(np.ones_like(space.w))
+        self._laplacian = kernels.laplacian(space, self.pattern, law.length_scale**2)
+        self._direct: Factorization | None = None
+        self._amg = AmgCG(self.pattern.matrix(self._assemble(np.ones_like(space.w))), tolerance)
+        self._last: np.ndarray | None = None
+        self.solves = self.skipped = self.iterations = self.fallbacks = 0
+
+    @property
+    def residual(self) -> float:
+        """True relative residual of the last iterative solve."""
+        return self._amg.residual
+
+    @property
+    def factorisations(self) -> int:
+        """Numerical factorisations made so far."""
+        return 0 if self._direct is None else self._direct.count
+
+    def solve(self, W_max: np.ndarray, gamma: np.ndarray) -> np.ndarray:
+        """Nodal gamma (n,) for the history `W_max` (ne, nq) [MPa], from the guess `gamma`.
+
+        Raises
+        ------
+        ConvergenceError
+            The solution is not finite, or the lumped one leaves (0, 1] by more than the solver's tolerance.
+        """
+        sink = 1.0 / (self.law.history(W_max) + self.law.epsilon)
+        if self._last is not None and np.all(np.abs(sink - self._last) <= self.unchanged * self._last):
+            self.skipped += 1
+            return gamma
+        self.solves += 1
+        data = self._assemble(sink)
+        result = None
+        if self.sink != "consistent" or sink.max() < 1e3 * sink.min():
+            result = self._amg.solve(self.pattern.matrix(data), self.load, gamma)
+            self.iterations += self._amg.iterations
+        if result is None:
+            result = self._factorise(data)
+        if not np.isfinite(result).all():
+            raise ConvergenceError("the relative density is not finite: the stored energy of a Gauss point overflowed")
+        if self.sink != "consistent" and not (result.min() > -1e-9 and result.max() < 1 + 1e-6):
+            raise ConvergenceError(f"the relative density left (0, 1]: {result.min():.3g} to {result.max():.6g}; the "
+                                   f"mesh has elements so flat that the lumped sink loses its maximum principle")
+        self._last = sink
+        return result
+
+    def _assemble(self, sink: np.ndarray) -> np.ndarray:
+        if self.sink == "consistent":
+            return self._laplacian + kernels.weighted_mass(self.space, self.pattern, sink)
+        data = self._laplacian.copy()
+        if self.sink == "lumped":
+            diagonal = self.space.lump(sink)
+        else:
+            diagonal = np.bincount(self.space.conn.ravel(), (self.space.w * sink).ravel(), self.space.n_nodes)
+        data[self.pattern.diagonal] += diagonal
+        return data
+
+    def _factorise(self, data: np.ndarray) -> np.ndarray:
+        """Direct solve, on the matrix scaled to a unit diagonal: its entries span fifteen decades."""
+        if self._direct is None:
+            if self.sink != "consistent":
+                log.warning("conjugate gradients on the %s sink did not converge in %d iterations; factorising",
+                            self.sink, self._amg.max_iterations)
+            else:
+                log.warning("the consistent sink varies by more than 1e3 inside an element, where conjugate gradients "
+                            "stall; factorising instead")
+            self._direct = Factorization(Pattern(self.space, upper=True))
+        self.fallbacks += 1
+        upper = self._direct.pattern
+        A = self.pattern.matrix(data)
+        scale = 1.0 / np.sqrt(A.diagonal())
+        rows = np.repeat(np.arange(upper.size), np.diff(upper.indptr))
+        keep = self.pattern.indices >= np.repeat(np.arange(self.pattern.size), np.diff(self.pattern.indptr))
+        self._direct.factorize(data[keep] * scale[rows] * scale[upper.indices])
+        return scale * self._direct.solve(scale * self.load, tolerance=1e-10)

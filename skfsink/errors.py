@@ -1,0 +1,63 @@
+"""What the program says when it cannot go on: one class for each kind of cause, one line for each message."""
+
+from __future__ import annotations
+
+import math
+
+__all__ = ["CheckpointError", "ConvergenceError", "InstabilityError", "MeshError", "MissingExtra",
+           "OutputError", "ParameterError", "SkfsinkError", "require"]
+
+
+class SkfsinkError(Exception):
+    """Base class: every error a user can cause or cure. The command line prints it on one line and exits with 2."""
+
+
+class ParameterError(SkfsinkError):
+    """A parameter has no meaning or lies outside its range."""
+
+
+class MeshError(SkfsinkError):
+    """A mesh is unknown, unreadable, or has elements that are not convex quadrilaterals or hexahedra."""
+
+
+class MissingExtra(SkfsinkError):
+    """An optional package is needed for what was asked."""
+
+
+class OutputError(SkfsinkError):
+    """The output folder cannot be used."""
+
+
+class CheckpointError(SkfsinkError):
+    """A checkpoint is damaged, or belongs to another scene."""
+
+
+class ConvergenceError(SkfsinkError):
+    """An iteration did not converge, and no smaller step is left to try."""
+
+
+class InstabilityError(SkfsinkError):
+    """The energy ledger, or a field, shows that a computed result can no longer be trusted."""
+
+
+def require(name: str, value: float, unit: str = "", *, low: float = -math.inf, high: float = math.inf,
+            low_open: bool = False, high_open: bool = False) -> float:
+    """Return `value` as a float if it is a finite number in the interval asked for.
+
+    Raises
+    ------
+    ParameterError
+        One line that names the parameter, the offending value and the range that is allowed.
+    """
+    left = ("(" if low_open or low == -math.inf else "[") + f"{low:g}"
+    right = f"{high:g}" + (")" if high_open or high == math.inf else "]")
+    allowed = f"{name} must be a finite number in {left}, {right}" + (f" {unit}" if unit else "")
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        raise ParameterError(f"{allowed}; got {value!r}") from None
+    too_low = number <= low if low_open else number < low
+    too_high = number >= high if high_open else number > high
+    if not math.isfinite(number) or too_low or too_high:
+        raise ParameterError(f"{allowed}; got {value!r}")
+    return number

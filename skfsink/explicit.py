@@ -1,0 +1,298 @@
+"""Explicit central differences with lumped, falling mass: the default integrator of the dynamic event.
+
+Velocity form of the scheme, for the free degrees of freedom:
+
+    u_{n+1} = u_n + dt (v_n + dt/2 a_n),   m a_{n+1} = -f(u_{n+1}),   v_{n+1} = v_n + dt/2 (a_n + a_{n+1}).
+
+gamma multiplies stiffness and mass alike, so damage does not lower the stable step. Every `gamma_every` steps gamma is
+solved anew; accelerations are kept when the mass changes with it.
+
+With V the mean velocity of a step and f_n = -m a_n, the scheme obeys, exactly,
+
+    K_{n+1} - K_n = - (f_n + f_{n+1})/2 . (u_{n+1} - u_n) + dt^2/8 (f_{n+1}.m^-1 f_{n+1} - f_n.m^-1 f_n),
+
+so the dissipation it adds is the difference between that trapezoidal work and the change of stored energy at fixed
+gamma, less the last term: that is what the ledger books as numerical.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse.linalg as sla
+from numba import njit
+
+from .deletion import delete_failed
+from .density import DensitySolver
+from .errors import InstabilityError, require
+from .linalg import symmetric_product
+from .momentum import Momentum
+from .space import Pattern
+from .state import State
+
+__all__ = ["Explicit", "ExplicitControls", "highest_frequency"]
+
+
+@dataclass(frozen=True)
+class ExplicitControls:
+    """Options of the explicit integrator.
+
+    Parameters
+    ----------
+    courant: step as a fraction of the estimated stability limit 2/omega_max, in (0, 1].
+    gamma_every: steps between solves for gamma, >= 1.
+    mass_floor: least lumped mass, as a fraction of the intact one, in [0, 1).
+    estimate_every: steps after which omega_max is estimated again at the latest, >= 1.
+    estimate_change: relative change of the cheap indicator that calls for a new estimate, in (0, 1).
+    """
+
+    courant: float = 0.9
+    gamma_every: int = 5
+    mass_floor: float = 1e-3
+    estimate_every: int = 400
+    estimate_change: float = 0.05
+
+    def __post_init__(self) -> None:
+        require("courant", self.courant, low=0, high=1, low_open=True)
+        require("gamma-every", self.gamma_every, "steps", low=1)
+        require("mass-floor", self.mass_floor, low=0, high=1, high_open=True)
+        require("estimate-every", self.estimate_every, "steps", low=1)
+        require("estimate-change", self.estimate_change, low=0, high=1, low_open=True, high_open=True)
+
+
+def highest_frequency(momentum: Momentum, pattern: Pattern, free: np.ndarray, u: np.ndarray, mass: np.ndarray,
+                      start: np.ndarray | None = None, tolerance: float = 1e-3) -> tuple[float, np.ndarray]:
+    """Highest eigenfrequency omega [rad/s] of  K(u) x = omega^2 M x  over the free unknowns, and its vector.
+
+    Lanczos on the mass-scaled tangent of the deformed, damaged body. `start` is a starting vector, best the result of
+    the last call. The estimate approaches from below, by about `tolerance`.
+    """
+    dim = momentum.space.dim
+    data = momentum.tangent(pattern, u)
+    scale = 1.0 / np.sqrt(np.repeat(mass, dim)[free])
+    indptr, indices = pattern.indptr.view(np.uint32), pattern.indices.view(np.uint32)
+    operator = sla.LinearOperator((pattern.size,) * 2, dtype=float, matvec=lambda x: scale * symmetric_product(
+        indptr, indices, data, scale * np.ascontiguousarray(x).ravel()))
+    if start is None:
+        start = np.sin(1.0 + np.arange(pattern.size) * 2.399963)  # no symmetry, the same every time
+    value, vector = sla.eigsh(operator, k=1, which="LA", v0=start, tol=tolerance, ncv=min(24, pattern.size - 1))
+    return float(np.sqrt(max(value[0], 0.0))), vector[:, 0]
+
+
+class Explicit:
+    """Integrates a :class:`State` from onset on.
+
+    Parameters
+    ----------
+    momentum, density: the two fields.
+    free: (n*dim,) mask of the degrees of freedom that are not held by a grip.
+    grip_velocity: (n, dim) velocity of the held ones [mm/s], zero elsewhere.
+    controls: options.
+    deletion: gamma at which an element fails.
+
+    Attributes
+    ----------
+    dt: the current step [s].   estimates: frequency estimates made.   reaction: (n, dim) internal force.
+    """
+
+    CHECK = 10  # steps between looks at the cheap indicator
+
+    def __init__(self, momentum: Momentum, density: DensitySolver, free: np.ndarray, grip_velocity: np.ndarray,
+                 controls: ExplicitControls | None = None, deletion: float = 1e-6) -> None:
+        self.momentum, self.density, self.deletion = momentum, density, deletion
+        self.controls = controls or ExplicitControls()
+        self.space = momentum.space
+        self.free = free
+        self._free = np.ascontiguousarray(free.reshape(-1, self.space.dim))
+        self._grip_velocity = grip_velocity
+        self._pattern = Pattern(self.space, self.space.dim, free, upper=True)
+        self.dt = 0.0
+        self.estimates = 0
+        self._omega = 0.0
+        self._mode: np.ndarray | None = None
+        self._indicator0 = 0.0
+        self._last_estimate = 0
+
+    def start(self, state: State) -> None:
+        """Forces, masses and accelerations of `state`; to be called once before stepping, and after a resume."""
+        self.momentum.set_gamma(state.gamma, state.deleted)
+        self.mass = self.momentum.lumped_mass(self.controls.mass_floor)
+        self.reaction = self.momentum.force(state.u)
+        self._W = self.momentum.tiles.W
+        self._W_max = self.momentum.tiles.tile(state.W_max)
+        self._elastic = self.momentum.energy
+
+    def begin(self, state: State) -> None:
+        """Set the body in motion: accelerations from the forces, energies of the start."""
+        self.start(state)
+        state.v[...] = self._grip_velocity
+        state.a[...] = np.where(self._free, -self.reaction / self.mass[:, None], 0.0)
+        state.ledger.initial = state.ledger.elastic = self._elastic
+        state.ledger.kinetic = self._kinetic(state)
+        state.ledger.initial += state.ledger.kinetic
+
+    def _kinetic(self, state: State) -> float:
+        return 0.5 * float(self.mass @ np.einsum("ai,ai->a", state.v, state.v))
+
+    # --- the step ---
+    def run(self, state: State, t_end: float) -> Iterator[State]:
+        """Step until `t_end` [s], yielding the state after each step."""
+        while state.time < t_end:
+            self.step(state)
+            yield state
+
+    def step(self, state: State) -> None:
+        """One time step, with the solve for gamma when it is due."""
+        if self._mode is None or state.step % self.CHECK == 0:
+            self._set_step(state)
+        dt = self.dt
+        old = np.where(self._free, -self.mass[:, None] * state.a, self.reaction)
+        du = _move(state.u, state.v, state.a, self._free, self._grip_velocity, dt)
+        force = self.momentum.force(state.u)
+        np.maximum(self._W_max, self._W, out=self._W_max)
+        trapezoid, held, kinetic, swing = _kick(state.v, state.a, self._free, self.mass, old, force, du, dt)
+        self.reaction = force
+        ledger = state.ledger
+        elastic = self.momentum.energy
+        ledger.numerical += trapezoid - (elastic - self._elastic) - dt * dt / 8 * swing
+        ledger.work += held
+        ledger.elastic = self._elastic = elastic
+        ledger.kinetic = kinetic
+        state.time += dt
+        state.grip += dt
+        state.step += 1
+        if state.step % self.controls.gamma_every == 0:
+            self.update_density(state)
+        if state.step % 100 == 0 and not np.isfinite(kinetic + elastic):
+            raise InstabilityError(f"the explicit integration blew up at t = {state.time:.4g} s (step {state.step}): "
+                                   f"lower courant, now {self.controls.courant:g}")
+
+    def update_density(self, state: State) -> None:
+        """Solve for gamma from the history, book what the sink takes, delete failed elements."""
+        momentum, ledger = self.momentum, state.ledger
+        state.W_max = momentum.tiles.untile(self._W_max)
+        solves = self.density.solves
+        state.gamma = self.density.solve(state.W_max, state.gamma)
+        if self.density.solves == solves:
+            return
+        failed = delete_failed(self.space, state, self.deletion, self.density.law.failure_energy)
+        before, mass = momentum.gamma, self.mass
+        momentum.set_gamma(state.gamma, state.deleted)
+        self.mass = momentum.lumped_mass(self.controls.mass_floor)
+        taken = momentum.tiles.tile(self.space.w * (before - momentum.gamma))
+        used = self.space.n_elements - (momentum.tiles.count - 1) * taken.shape[2]
+        taken[-1, :, used:] = 0.0
+        stored = float(np.vdot(taken, self._W))
+        ledger.sink_stored += stored
+        ledger.sink_kinetic += 0.5 * float((mass - self.mass) @ np.einsum("ai,ai->a", state.v, state.v))
+        self._elastic -= stored
+        ledger.elastic = self._elastic
+        ledger.kinetic = self._kinetic(state)
+
+    # --- the step size ---
+    def _set_step(self, state: State) -> None:
+        c = self.controls
+        indicator = self._indicator(state.u)
+        ratio = indicator / self._indicator0 if self._indicator0 > 0 else np.inf
+        due = state.step - self._last_estimate >= c.estimate_every
+        if self._mode is None or due or abs(ratio - 1) > 2 * c.estimate_change:
+            self._omega, self._mode = highest_frequency(self.momentum, self._pattern, self.free, state.u, self.mass,
+                                                        self._mode)
+            self._indicator0, self._last_estimate, ratio = indicator, state.step, 1.0
+            self.estimates += 1
+        self.dt = c.courant * 2.0 / (self._omega * np.sqrt(max(1.0, ratio)))
+
+    def _indicator(self, u: np.ndarray) -> float:
+        """Greatest volumetric stiffness to mass ratio of one element, gamma_bar k |b|^2_(1/m)/V: follows omega_max^2."""
+        g = self.momentum.space.element_mean(self.momentum.gamma)
+        return float(_volumetric_ratio(self.space.conn, self.space.X + u, self.space.dN, self.space.w, g, self.mass)
+                     * self.momentum.material.bulk_modulus)
+
+    # --- checkpoints ---
+    def memory(self) -> dict[str, np.ndarray]:
+        """What the integrator remembers beyond the state, for a checkpoint."""
+        assert self._mode is not None
+        return {"mode": self._mode, "scalars": np.array([self.dt, self._omega, self._indicator0,
+                                                         self._last_estimate, self.estimates, self._elastic]),
+                "reaction": self.reaction}
+
+    def restore(self, state: State, memory: dict[str, np.ndarray]) -> None:
+        """Go on exactly where :meth:`memory` was taken."""
+        self.start(state)
+        self._mode = memory["mode"]
+        self.dt, self._omega, self._indicator0, last, estimates, self._elastic = map(float, memory["scalars"])
+        self._last_estimate, self.estimates = int(last), int(estimates)
+        self.reaction = memory["reaction"]
+
+
+@njit(cache=True)
+def _move(u, v, a, free, grip_velocity, dt):  # type: ignore[no-untyped-def]
+    """Advance v by half a step and u by a step; returns the displacement increment."""
+    du = np.empty_like(u)
+    for n in range(u.shape[0]):
+        for i in range(u.shape[1]):
+            if free[n, i]:
+                v[n, i] += 0.5 * dt * a[n, i]
+                du[n, i] = dt * v[n, i]
+            else:
+                du[n, i] = dt * grip_velocity[n, i]
+            u[n, i] += du[n, i]
+    return du
+
+
+@njit(cache=True)
+def _kick(v, a, free, mass, old, force, du, dt):  # type: ignore[no-untyped-def]
+    """Second half of the step; returns trapezoidal work (all, held), kinetic energy, change of f.m^-1 f (free)."""
+    work, held, kinetic, swing = 0.0, 0.0, 0.0, 0.0
+    for n in range(v.shape[0]):
+        for i in range(v.shape[1]):
+            step_work = 0.5 * (old[n, i] + force[n, i]) * du[n, i]
+            work += step_work
+            if free[n, i]:
+                a[n, i] = -force[n, i] / mass[n]
+                v[n, i] += 0.5 * dt * a[n, i]
+                swing += (force[n, i] ** 2 - old[n, i] ** 2) / mass[n]
+            else:
+                held += step_work
+            kinetic += 0.5 * mass[n] * v[n, i] ** 2
+    return work, held, kinetic, swing
+
+
+@njit(cache=True)
+def _volumetric_ratio(conn, x, dN, w, gamma_bar, mass):  # type: ignore[no-untyped-def]
+    ne, nq, na, dim = dN.shape
+    b = np.empty((na, dim))
+    F = np.empty((dim, dim))
+    greatest = 0.0
+    for e in range(ne):
+        if gamma_bar[e] == 0.0:
+            continue
+        b[:] = 0.0
+        V = 0.0
+        for q in range(nq):
+            V += w[e, q]
+            for i in range(dim):
+                for j in range(dim):
+                    s = 0.0
+                    for a in range(na):
+                        s += x[conn[e, a], i] * dN[e, q, a, j]
+                    F[i, j] = s
+            for a in range(na):
+                for i in range(dim):
+                    s = 0.0
+                    for j in range(dim):
+                        if dim == 2:
+                            cof = F[1 - i, 1 - j] if i == j else -F[1 - i, 1 - j]
+                        else:
+                            i1, i2, j1, j2 = (i + 1) % 3, (i + 2) % 3, (j + 1) % 3, (j + 2) % 3
+                            cof = F[i1, j1] * F[i2, j2] - F[i1, j2] * F[i2, j1]
+                        s += cof * dN[e, q, a, j]
+                    b[a, i] += w[e, q] * s
+        total = 0.0
+        for a in range(na):
+            for i in range(dim):
+                total += b[a, i] ** 2 / mass[conn[e, a]]
+        greatest = max(greatest, gamma_bar[e] * total / V)
+    return greatest

@@ -1,0 +1,321 @@
+"""Implicit Hilber-Hughes-Taylor integration (Eq. 25-29), with adaptive steps.
+
+    M a_{n+1} + (1 + alpha) F_{n+1} - alpha F_n = 0,
+    u_{n+1} = u_n + dt v_n + dt^2 [(1/2 - beta) a_n + beta a_{n+1}],
+    v_{n+1} = v_n + dt [(1 - g) a_n + g a_{n+1}],       beta = (1 - alpha)^2/4,  g = 1/2 - alpha.
+
+The two fields are coupled either by iterating them together in each step as in Fig. 2 of the paper, or by a single
+pass: gamma from the last accepted state, then Newton's method at that gamma. The paper's HHT weights on gamma
+(Eq. 25) multiply an equation that has no rate term; they change its iteration, not its solution, and are left out.
+
+A step is accepted when, over the nodes that still have mass, the largest residual is below `force_tolerance` times
+the mean force, the last correction below `correction_tolerance` times the increment, and gamma has settled. History
+and deletions are committed on accepted steps only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from .deletion import delete_failed
+from .density import DensitySolver
+from .errors import ConvergenceError, ParameterError, require
+from .linalg import Factorization, symmetric_product
+from .momentum import Momentum
+from .space import Pattern
+from .state import State
+
+__all__ = ["COUPLINGS", "HHT", "HHTControls"]
+
+COUPLINGS = ("iterated", "single")
+
+
+@dataclass(frozen=True)
+class HHTControls:
+    """Options of the implicit integrator.
+
+    Parameters
+    ----------
+    alpha: damping parameter, in [-1/3, 0].
+    dt: largest time step [s], > 0.
+    dt_first: first time step [s], > 0; 0 takes `dt`.
+    dt_least: step below which the integration gives up [s], > 0.
+    coupling: "iterated" or "single".
+    force_tolerance, correction_tolerance: ABAQUS-like tests, in (0, 0.1].
+    gamma_tolerance: change of gamma in the last iteration of a step, in (0, 0.1].
+    max_iterations: iterations after which a step is rejected, >= 3.
+    """
+
+    alpha: float = -0.05
+    dt: float = 1.6e-7
+    dt_first: float = 0.0
+    dt_least: float = 1e-13
+    coupling: str = "iterated"
+    force_tolerance: float = 1e-3
+    correction_tolerance: float = 2e-3
+    gamma_tolerance: float = 1e-2
+    max_iterations: int = 16
+
+    def __post_init__(self) -> None:
+        require("hht-alpha", self.alpha, low=-1 / 3, high=0)
+        require("hht-dt", self.dt, "s", low=0, low_open=True)
+        require("hht-dt-first", self.dt_first, "s", low=0)
+        require("hht-dt-least", self.dt_least, "s", low=0, low_open=True)
+        require("force-tolerance", self.force_tolerance, low=0, high=0.1, low_open=True)
+        require("correction-tolerance", self.correction_tolerance, low=0, high=0.1, low_open=True)
+        require("gamma-tolerance", self.gamma_tolerance, low=0, high=0.1, low_open=True)
+        require("max-iterations", self.max_iterations, low=3)
+        if self.coupling not in COUPLINGS:
+            raise ParameterError(f"coupling must be one of {', '.join(COUPLINGS)}; got {self.coupling!r}")
+
+    @property
+    def beta(self) -> float:
+        """Newmark's beta = (1 - alpha)^2/4."""
+        return (1 - self.alpha) ** 2 / 4
+
+    @property
+    def newmark_gamma(self) -> float:
+        """Newmark's gamma = 1/2 - alpha."""
+        return 0.5 - self.alpha
+
+
+class _Trial(NamedTuple):
+    u: np.ndarray
+    a: np.ndarray
+    gamma: np.ndarray
+    force: np.ndarray
+    W: np.ndarray
+    mass: np.ndarray
+
+
+class HHT:
+    """Integrates a :class:`State`; see the module for the scheme.
+
+    Parameters
+    ----------
+    momentum, density: the two fields.
+    free: (n*dim,) mask of the degrees of freedom that no grip holds.
+    grip_velocity: (n, dim) velocity of the held ones [mm/s].
+    deletion: gamma at which an element fails.
+
+    Attributes
+    ----------
+    dt: size of the next step [s].   rejected: steps given up.   iterations: Newton iterations made.
+    reaction: (n, dim) internal force of the last accepted state.
+    """
+
+    GROW = 1.5
+    LEAST_J = 0.02
+
+    def __init__(self, momentum: Momentum, density: DensitySolver, free: np.ndarray, grip_velocity: np.ndarray,
+                 controls: HHTControls | None = None, deletion: float = 1e-6, threads: int = 1) -> None:
+        self.momentum, self.density, self.deletion = momentum, density, deletion
+        self.controls = controls or HHTControls()
+        self.space = momentum.space
+        self.free = free
+        self._held = ~free.reshape(-1, self.space.dim)
+        self._grip_velocity = grip_velocity
+        self._pattern = Pattern(self.space, self.space.dim, free, upper=True)
+        self.solver = Factorization(self._pattern, threads=threads)
+        self.dt = self.controls.dt_first or self.controls.dt
+        self.rejected = self.iterations = 0
+
+    def start(self, state: State) -> None:
+        """Forces and masses of `state`; after a resume :meth:`restore` does it."""
+        self.momentum.set_gamma(state.gamma, state.deleted)
+        self.reaction = self.momentum.force(state.u)
+        self._W = self.momentum.W
+        self._gamma = self.momentum.gamma
+        self._mass = self.momentum.consistent_mass(self._pattern)
+
+    def begin(self, state: State) -> None:
+        """Set the body in motion: accelerations from the forces, energies of the start."""
+        self.start(state)
+        state.v[self._held] = self._grip_velocity[self._held]
+        self._inertia = -self.reaction.ravel()[self.free]
+        self.solver.factorize(self._mass)
+        state.a[...] = 0.0
+        state.a.reshape(-1)[self.free] = self.solver.solve(self._inertia)
+        state.ledger.elastic = self.momentum.energy
+        state.ledger.kinetic = self._kinetic(self._mass, state.v)
+        state.ledger.initial = state.ledger.elastic + state.ledger.kinetic
+
+    def _times(self, mass: np.ndarray, x: np.ndarray) -> np.ndarray:
+        p = self._pattern
+        return symmetric_product(p.indptr.view(np.uint32), p.indices.view(np.uint32), mass, x)
+
+    def _kinetic(self, mass: np.ndarray, v: np.ndarray) -> float:
+        free = v.ravel()[self.free]
+        return 0.5 * float(free @ self._times(mass, free))
+
+    def _kinetic_density(self, v: np.ndarray) -> np.ndarray:
+        """rho0 |v|^2/2 at the Gauss points [MPa], (ne, nq): what Eq. (28) weights with gamma."""
+        at_gauss = np.einsum("qa,eai->eqi", self.space.N, v[self.space.conn])
+        return 0.5 * self.momentum.material.rho0 * np.einsum("eqi,eqi->eq", at_gauss, at_gauss)
+
+    def run(self, state: State, t_end: float) -> Iterator[State]:
+        """Step until `t_end` [s], yielding the state after each accepted step."""
+        while state.time < t_end:
+            self.step(state)
+            yield state
+
+    def step(self, state: State) -> None:
+        """One accepted time step; halves the step until one is.
+
+        Raises
+        ------
+        ConvergenceError
+            No step down to `dt_least` converges.
+        """
+        if self.controls.coupling == "single":
+            self._damage(state)
+        while True:
+            trial, iterations = self._attempt(state, self.dt)
+            if trial is not None:
+                break
+            self.rejected += 1
+            self.dt *= 0.5
+            if self.dt < self.controls.dt_least:
+                raise ConvergenceError(f"the implicit integration stalled at t = {state.time:.4g} s: no step down to "
+                                       f"{self.controls.dt_least:.1g} s converges; lower hht-dt or use explicit")
+        self._accept(state, trial, self.dt)
+        if iterations <= self.controls.max_iterations // 2:
+            self.dt = min(self.dt * self.GROW, self.controls.dt)
+
+    def _damage(self, state: State) -> None:
+        """Single pass: bring gamma up to the history of the accepted state, at fixed displacement and velocity."""
+        momentum, ledger = self.momentum, state.ledger
+        state.gamma = self.density.solve(state.W_max, state.gamma)
+        momentum.set_gamma(state.gamma, state.deleted)
+        taken = self.space.w * (self._gamma - momentum.gamma)
+        ledger.sink_stored += float(np.vdot(taken, self._W))
+        ledger.sink_kinetic += float(np.vdot(taken, self._kinetic_density(state.v)))
+        self._gamma = momentum.gamma
+        self._mass = momentum.consistent_mass(self._pattern)
+        self.reaction = momentum.force(state.u)
+        self._inertia = self._times(self._mass, state.a.ravel()[self.free])
+
+    def _attempt(self, state: State, dt: float) -> tuple[_Trial | None, int]:
+        c, momentum = self.controls, self.momentum
+        free = self.free
+        gamma = state.gamma
+        momentum.set_gamma(gamma, state.deleted)
+        mass = momentum.consistent_mass(self._pattern)
+        shape = state.u.shape
+        base = state.u + dt * state.v + dt * dt * (0.5 - c.beta) * state.a
+        u = base + dt * dt * c.beta * state.a
+        u[self._held] = (state.u + dt * self._grip_velocity)[self._held]
+        a = state.a.copy()
+        a[self._held] = 0.0
+        correction, settled = np.inf, c.coupling == "single"
+        for iteration in range(c.max_iterations + 1):
+            force = momentum.force(u)
+            if not (momentum.least_J > self.LEAST_J and np.isfinite(momentum.energy)):
+                return None, iteration
+            inertia = self._times(mass, a.ravel()[free])
+            r = inertia + ((1 + c.alpha) * force - c.alpha * self.reaction).ravel()[free]
+            live = np.repeat(self.space.lump(momentum.gamma) > 1e-3 * self._volume, shape[1])[free]
+            level = float(np.mean(np.abs(force.ravel()[free][live]))) + float(np.mean(np.abs(inertia[live])))
+            increment = float(np.abs((u - state.u).ravel()[free][live]).max()) + 1e-300
+            done = np.abs(r[live]).max() <= c.force_tolerance * level and correction <= c.correction_tolerance * increment
+            if done and settled:
+                return _Trial(u, a, gamma, force, momentum.W, mass), iteration
+            if iteration == c.max_iterations:
+                break
+            data = mass / (c.beta * dt * dt) + (1 + c.alpha) * momentum.tangent(self._pattern, u)
+            self.iterations += 1
+            try:
+                self.solver.factorize(data)
+                d = self.solver.solve(-r, tolerance=1e-8)
+            except ConvergenceError:
+                return None, iteration
+            step = np.zeros(u.size)
+            step[free] = d
+            correction = float(np.abs(d[live]).max())
+            u = u + step.reshape(shape)
+            a = a + step.reshape(shape) / (c.beta * dt * dt)  # not from u - base, which cancels at small steps
+            if c.coupling == "iterated":
+                momentum.force(u)
+                if not (momentum.least_J > self.LEAST_J and np.isfinite(momentum.energy)):
+                    return None, iteration
+                new = self.density.solve(np.maximum(state.W_max, momentum.W), gamma)
+                settled = float(np.abs(new - gamma).max()) <= c.gamma_tolerance
+                gamma = new
+                momentum.set_gamma(gamma, state.deleted)
+                mass = momentum.consistent_mass(self._pattern)
+        return None, c.max_iterations
+
+    @property
+    def _volume(self) -> np.ndarray:
+        return self.density.load
+
+    def _accept(self, state: State, trial: _Trial, dt: float) -> None:
+        c, ledger, free, momentum = self.controls, state.ledger, self.free, self.momentum
+        g = c.newmark_gamma
+        gamma_new = momentum.gamma
+        a0, a1 = state.a.ravel()[free], trial.a.ravel()[free]
+        v0 = state.v.ravel()[free]
+        v1 = v0 + dt * ((1 - g) * a0 + g * a1)
+        du = trial.u - state.u
+        w, gamma_old = self.space.w, self._gamma
+        total = np.maximum(gamma_old + gamma_new, 1e-300)
+        weight = w * (gamma_old - gamma_new) / total
+        # A change of gamma W splits exactly into (mean W) d(gamma) + (mean gamma) dW. With W averaged by the gammas and
+        # the harmonic mean of gamma, a point that dies within the step is booked with the energy it had, not with what
+        # its shape is worth afterwards.
+        ledger.sink_stored += float(np.einsum("eq,eq->", weight, gamma_old * self._W + gamma_new * trial.W))
+        stored = float(np.einsum("eq,eq,eq->", w, 2 * gamma_old * gamma_new / total, trial.W - self._W))
+        v1_full = state.v.copy()
+        v1_full.reshape(-1)[free] = v1
+        k0, k1 = self._kinetic_density(state.v), self._kinetic_density(v1_full)
+        ledger.sink_kinetic += float(np.einsum("eq,eq->", weight, gamma_old * k0 + gamma_new * k1))
+        # numerical dissipation: the scheme's equations put into the change of kinetic energy at that mean gamma
+        dM = trial.mass - self._mass
+        inertia = -((1 + c.alpha) * trial.force - c.alpha * self.reaction).ravel()[free]
+        da, mean_a = a1 - a0, 0.5 * (a0 + a1)
+        M_mean_a = 0.5 * (inertia + self._inertia) - 0.25 * self._times(dM, da)
+        M_da = inertia - self._inertia - self._times(dM, mean_a)
+        v_mean = du.ravel()[free] / dt - dt * (c.beta - g / 2) * da
+        motion = dt * float(v_mean @ (M_mean_a + (g - 0.5) * M_da))
+        motion -= float(np.einsum("eq,eq->", w * (gamma_old - gamma_new) ** 2 / (2 * total), k1 - k0))
+        work = 0.5 * (self.reaction + trial.force) * du
+        held = float(work[self._held].sum())
+        ledger.numerical += held - stored - motion
+        ledger.work += held
+        # commit
+        state.u, state.gamma = trial.u, trial.gamma
+        state.a = trial.a.copy()
+        state.v.reshape(-1)[free] = v1
+        state.W_max = np.maximum(state.W_max, trial.W)
+        state.time += dt
+        state.grip += dt
+        state.step += 1
+        before = gamma_new
+        if delete_failed(self.space, state, self.deletion, self.density.law.failure_energy).size:
+            momentum.set_gamma(state.gamma, state.deleted)
+            ledger.deletion += float(np.einsum("eq,eq,eq->", w, before - momentum.gamma, trial.W))
+        self._mass = momentum.consistent_mass(self._pattern)
+        dead = self.space.lump(momentum.gamma) <= 0.0
+        state.v[dead] = 0.0
+        state.a[dead] = 0.0
+        kinetic = self._kinetic(self._mass, state.v)
+        ledger.deletion += self._kinetic(trial.mass, state.v) - kinetic
+        ledger.kinetic = kinetic
+        self.reaction = momentum.force(state.u)
+        ledger.elastic = momentum.energy
+        self._inertia, self._W, self._gamma = inertia, momentum.W, momentum.gamma
+
+    def memory(self) -> dict[str, np.ndarray]:
+        """What the integrator remembers beyond the state, for a checkpoint."""
+        return {"inertia": self._inertia, "scalars": np.array([self.dt, self.rejected, self.iterations])}
+
+    def restore(self, state: State, memory: dict[str, np.ndarray]) -> None:
+        """Go on exactly where :meth:`memory` was taken."""
+        self.start(state)
+        self._inertia = memory["inertia"]
+        self.dt = float(memory["scalars"][0])
+        self.rejected, self.iterations = int(memory["scalars"][1]), int(memory["scalars"][2])

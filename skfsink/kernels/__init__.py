@@ -1,0 +1,13 @@
+"""Compiled element loops: the weak forms of :mod:`skfsink.forms`, equal to them to rounding and used by every run.
+
+force2d, force3d   internal force, stored energy and its density; explicit steps spend their time here
+tiles              the memory layout those two work on
+tangent            tangent stiffness with material, geometric and J_bar coupling
+scalar             mass, Laplacian and sink matrices
+"""
+
+from .scalar import laplacian, mass, weighted_mass
+from .tangent import ERSATZ_STIFFNESS, SOFT_GAMMA, tangent
+from .tiles import Tiles
+
+__all__ = ["ERSATZ_STIFFNESS", "SOFT_GAMMA", "Tiles", "laplacian", "mass", "tangent", "weighted_mass"]

@@ -1,0 +1,300 @@
+"""Unstructured all-quadrilateral meshes of notched samples, made with gmsh.
+
+A sample is described by its *outline*, a closed chain of straight and circular `Edge` pieces that carry the
+names of the boundaries, and by a `SizeField`, fine inside boxes and graded outside of them. `mesh_outline`
+turns these into a `meshio.Mesh`; a sample shape is no more than a function like `single_edge_notch_mesh`.
+
+The meshes are irregular on purpose, since long rows of aligned elements steer a crack. Frontal Delaunay
+triangles are recombined and subdivided into quadrilaterals; a slight ripple of the element size, drawn from
+`seed`, breaks up the rows that grow where the size is uniform.
+
+Those in `cases/<sample>/meshes` are from `python -m skfsink.meshing <sample> [--mesh M3]` and gmsh 4.15.2.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import meshio
+import numpy as np
+from numpy.typing import NDArray
+
+from skfsink.errors import MeshError, MissingExtra, require
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+Box = tuple[float, float, float, float]  # x0, x1, y0, y1 of a rectangle of fine elements
+
+BOUNDARY_PREFIX = "boundary:"
+RIPPLE = 0.08  # root mean square of the relative ripple of the element size
+RIPPLE_LENGTH = 15  # its wavelength in fine element sizes
+TYPICAL_SCALE = 1.155  # triangles of 1.155 h make quadrilaterals of size h
+TOLERANCE = 0.01  # relative, for the number of elements
+SMALLEST = 0.25  # least area over longest diagonal, in element sizes (a square has 0.71)
+LEAST_JACOBIAN = 0.5
+ATTEMPTS = 12  # meshes that are made to meet the last three
+SHORT_ARC = 12  # arcs of fewer edges get equal edges
+OPTIONS = {
+    "General.Terminal": 0,
+    "General.NumThreads": 1,
+    "Mesh.Algorithm": 6,  # frontal Delaunay
+    "Mesh.RecombineAll": 1,
+    "Mesh.RecombinationAlgorithm": 2,  # full-quad: recombine at twice the size, then subdivide
+    "Mesh.Smoothing": 10,
+    "Mesh.MeshSizeExtendFromBoundary": 0,
+    "Mesh.MeshSizeFromPoints": 0,
+    "Mesh.MeshSizeFromCurvature": 0,
+}
+
+
+class Edge(NamedTuple):
+    """A piece of an outline, from where the one before ended to `end`: straight, or an arc through `via`."""
+
+    name: str
+    end: tuple[float, float]
+    via: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class SizeField:
+    """Element size: `h` inside the boxes, growing by `grading` per unit of distance up to `h_coarse`."""
+
+    h: float
+    h_coarse: float
+    boxes: tuple[Box, ...]
+    grading: float = 0.15
+
+    def __post_init__(self) -> None:
+        require("h", self.h, "mm", low=0, low_open=True)
+        require("h_coarse", self.h_coarse, "mm", low=self.h)
+        require("grading", self.grading, low=0, low_open=True)
+
+    def __call__(self, x: float, y: float) -> float:
+        """The element size at a point."""
+        away = min(math.hypot(max(a - x, x - b, 0), max(c - y, y - d, 0)) for a, b, c, d in self.boxes)
+        return min(self.h_coarse, self.h + self.grading * away)
+
+
+def single_edge_notch_mesh(*, side: float = 4.0, notch: float = 1.0, notch_width: float = 0.1,
+                           h: float = 0.1 / 3, h_coarse: float = 0.11, half_height: float = 1.7,
+                           seed: int = 0) -> meshio.Mesh:
+    """Mesh the square plate [0, side]^2 with a round-tipped notch from the left edge at mid-height.
+
+    `notch` is the length of the notch up to its tip, the top of a semicircle of diameter `notch_width`. The
+    element size is `h` in the corridor ahead of the notch, up to `half_height` above and below it and out to
+    the right edge, and is graded to `h_coarse` elsewhere. Lengths are in mm. Each `seed` gives another mesh
+    of the same sizes. The boundaries are `left` (without the mouth of the notch), `right`, `top`, `bottom`
+    and `notch` (both flanks and the tip).
+    """
+    require("side", side, "mm", low=0, low_open=True)
+    require("notch_width", notch_width, "mm", low=0, high=side, low_open=True, high_open=True)
+    require("notch", notch, "mm", low=notch_width / 2, high=side, low_open=True, high_open=True)
+    require("half_height", half_height, "mm", low=0, low_open=True)
+    radius, middle = notch_width / 2, side / 2
+    outline = [
+        Edge("bottom", (side, 0)),
+        Edge("right", (side, side)),
+        Edge("top", (0, side)),
+        Edge("left", (0, middle + radius)),
+        Edge("notch", (notch - radius, middle + radius)),
+        Edge("notch", (notch - radius, middle - radius), via=(notch, middle)),
+        Edge("notch", (0, middle - radius)),
+        Edge("left", (0, 0)),
+    ]
+    corridor = (notch - 1.5 * notch_width, side, middle - half_height, middle + half_height)
+    return mesh_outline(outline, SizeField(h, h_coarse, (corridor,)), seed=seed)
+
+
+# Sizes are l/1.5, l/3, l/4 and l/5 for the length l = 0.1 mm, the last three moved by at most 1 % so that the
+# numbers of elements are within 1 % of those of Table 1 of the paper (11,140, 18,967 and 28,784).
+MESHES: dict[str, dict[str, Any]] = {
+    "coarse": {"h": 0.1 / 1.5}, "M3": {"h": 0.0331}, "M4": {"h": 0.02505}, "M5": {"h": 0.0202}}
+SAMPLES = {"single_edge_notch": (single_edge_notch_mesh, MESHES)}
+
+
+def mesh_outline(outline: Sequence[Edge], size: SizeField, *, seed: int = 0) -> meshio.Mesh:
+    """Mesh the region inside a closed `outline` with quadrilaterals; the boundary names become cell sets.
+
+    What gmsh makes of a size field is some per cent off, by an amount that depends on the seed, and may have
+    a tiny element, which would spoil the time step. Meshes are therefore made, each with its own ripple and a
+    rescaled field, until one has as many elements as squares of the asked sizes and no bad element.
+    """
+    scale, best, least = TYPICAL_SCALE, None, math.inf
+    with _gmsh_model() as gmsh:
+        names = _add_outline(gmsh, outline)
+        for attempt in range(ATTEMPTS):
+            ripple = _ripple(RIPPLE_LENGTH * size.h, seed, attempt)
+            points, quads, lines, triangles = _generate(gmsh, size, ripple, scale)
+            ratio, miss = _judge(points, quads, size)
+            if miss < least and not triangles:
+                best, least = (points, quads, lines), miss
+            if least <= 1:
+                break
+            scale *= math.sqrt(ratio)
+    if best is None:
+        raise MeshError("gmsh made no mesh of convex quadrilaterals only; try another seed")
+    return _to_meshio(*best, names)
+
+
+def scaled_jacobian(points: Array, quads: Indices) -> Array:
+    """Smallest sine of the four corner angles of each quadrilateral: 1 for rectangles, <= 0 if not convex."""
+    corners = points[quads][:, :, :2]
+    ahead, back = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
+    cross = ahead[..., 0] * back[..., 1] - ahead[..., 1] * back[..., 0]
+    smallest: Array = (cross / np.linalg.norm(ahead, axis=2) / np.linalg.norm(back, axis=2)).min(axis=1)
+    return smallest
+
+
+def write_mesh(path: str | Path, mesh: meshio.Mesh) -> None:
+    """Write a mesh to a VTU file; a cell set becomes the cell data `boundary:<name>`, 1 on its cells."""
+    flags = {BOUNDARY_PREFIX + name: [np.isin(np.arange(len(block.data)), index).astype(np.int8)
+                                      for block, index in zip(mesh.cells, members, strict=True)]
+             for name, members in mesh.cell_sets.items()}
+    cells = [(block.type, block.data.astype(np.int32)) for block in mesh.cells]
+    meshio.write(path, meshio.Mesh(mesh.points, cells, cell_data=flags), file_format="vtu")
+
+
+def read_mesh(path: str | Path) -> meshio.Mesh:
+    """Read a mesh written by `write_mesh`, with the boundaries as cell sets again."""
+    mesh = meshio.read(path)
+    for key in [key for key in mesh.cell_data if key.startswith(BOUNDARY_PREFIX)]:
+        name = key.removeprefix(BOUNDARY_PREFIX)
+        mesh.cell_sets[name] = [np.flatnonzero(flags) for flags in mesh.cell_data.pop(key)]
+    return mesh
+
+
+def _ripple(length: float, *seeds: int, waves: int = 8) -> Callable[[float, float], float]:
+    """A random smooth factor around 1: a sum of plane waves of all directions and about the given length."""
+    random = np.random.default_rng([int(require("seed", seed, low=0)) for seed in seeds])
+    angle, phase = random.uniform(0, 2 * np.pi, (2, waves))
+    number = 2 * np.pi / length * random.uniform(0.7, 1.4, waves)
+    kx, ky = number * np.cos(angle), number * np.sin(angle)
+    amplitude = RIPPLE * math.sqrt(2 / waves)
+    return lambda x, y: 1 + amplitude * float(np.sin(kx * x + ky * y + phase).sum())
+
+
+@contextmanager
+def _gmsh_model() -> Iterator[Any]:
+    """The gmsh module with an empty model and the options of this module."""
+    try:
+        import gmsh
+    except (ImportError, OSError) as error:  # OSError: a system library that gmsh needs is missing
+        raise MissingExtra(f"making a mesh needs gmsh, which cannot be imported ({error})") from error
+    if gmsh.isInitialized():
+        raise MeshError("gmsh is in use; call gmsh.finalize() before making a mesh")
+    gmsh.initialize(readConfigFiles=False, interruptible=False)
+    try:
+        for option, value in OPTIONS.items():
+            gmsh.option.setNumber(option, value)
+        gmsh.model.add("sample")
+        yield gmsh
+    finally:
+        gmsh.finalize()
+
+
+def _add_outline(gmsh: Any, outline: Sequence[Edge]) -> dict[int, str]:
+    """Add the surface inside the outline to the model; returns the boundary names by curve tag."""
+    occ = gmsh.model.occ
+    corners = [occ.addPoint(*edge.end, 0) for edge in outline]
+    names: dict[int, str] = {}
+    for i, edge in enumerate(outline):
+        if edge.via is None:
+            tag = occ.addLine(corners[i - 1], corners[i])
+        else:
+            via = occ.addPoint(*edge.via, 0)
+            tag = occ.addCircleArc(corners[i - 1], via, corners[i], center=False)
+            occ.remove([(0, via)])
+        names[tag] = edge.name
+    occ.addPlaneSurface([occ.addCurveLoop(list(names))])
+    occ.synchronize()
+    return names
+
+
+def _generate(gmsh: Any, size: SizeField, ripple: Callable[[float, float], float],
+              scale: float) -> tuple[Array, Indices, dict[int, Indices], int]:
+    """Mesh the model: points, counter-clockwise quads, line cells by curve tag, number of triangles left."""
+    mesh = gmsh.model.mesh
+    mesh.clear()
+    mesh.setSizeCallback(lambda dim, tag, x, y, z, _: scale * ripple(x, y) * size(x, y))
+    for _, tag in gmsh.model.getEntities(1):
+        if gmsh.model.getType(1, tag) == "Circle":
+            x0, y0, _, x1, y1, _ = gmsh.model.getBoundingBox(1, tag)
+            edges = gmsh.model.occ.getMass(1, tag) / size((x0 + x1) / 2, (y0 + y1) / 2)
+            if edges < SHORT_ARC:  # an even number of them, at least four
+                mesh.setTransfiniteCurve(tag, 2 * max(2, math.ceil(edges / 2)) + 1)
+    mesh.generate(2)
+    tags, coordinates, _ = mesh.getNodes()
+    index = np.zeros(int(tags.max()) + 1, dtype=np.int64)
+    index[tags] = np.arange(len(tags))
+    points = coordinates.reshape(-1, 3)
+    triangles, quads = (index[mesh.getElementsByType(kind)[1]] for kind in (2, 3))
+    quads = quads.reshape(-1, 4)
+    quads = np.where(_areas(points[quads])[:, None] < 0, quads[:, ::-1], quads)
+    curves = [tag for _, tag in gmsh.model.getEntities(1)]
+    lines = {tag: index[mesh.getElements(1, tag)[2][0]].reshape(-1, 2) for tag in curves}
+    return points, quads, lines, len(triangles) // 3
+
+
+def _judge(points: Array, quads: Indices, size: SizeField) -> tuple[float, float]:
+    """Number of elements over that of squares of the asked sizes; badness (1: good enough)."""
+    cells = points[quads]
+    wanted = np.array([size(x, y) for x, y, _ in cells.mean(axis=1).tolist()])
+    areas, diagonals = _areas(cells), np.linalg.norm(cells[:, 2:] - cells[:, :2], axis=2)
+    ratio = len(quads) / float(np.sum(areas / wanted**2))
+    smallest, jacobian = np.min(areas / diagonals.max(axis=1) / wanted), scaled_jacobian(points, quads).min()
+    if smallest <= 0 or jacobian <= 0:
+        return ratio, math.inf
+    return ratio, max(abs(ratio - 1) / TOLERANCE, SMALLEST / smallest, LEAST_JACOBIAN / jacobian)
+
+
+def _areas(cells: Array) -> Array:
+    """Areas of quadrilaterals given by their corners, positive if counter-clockwise."""
+    one, two = cells[:, 2] - cells[:, 0], cells[:, 3] - cells[:, 1]
+    return (one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]) / 2
+
+
+def _to_meshio(points: Array, quads: Indices, lines: Mapping[int, Indices],
+               names: Mapping[int, str]) -> meshio.Mesh:
+    """Quadrilaterals and named line cells, numbered along strips (for locality)."""
+    x, y, _ = points[quads].mean(axis=1).T
+    quads = quads[np.lexsort((y, np.floor(x / np.sqrt(16 * np.median(_areas(points[quads]))))))]
+    used, first = np.unique(quads, return_index=True)
+    order = used[np.argsort(first)]
+    index = np.full(len(points), -1)
+    index[order] = np.arange(len(order))
+    grid = 2.0 ** (math.ceil(math.log2(np.abs(points).max())) - 28)  # coordinates of 28 bits compress well
+    points = np.round(points[order] / grid) * grid
+    blocks: list[Indices] = [index[block] for block in lines.values()]
+    owner = np.repeat(np.array([names[tag] for tag in lines]), [len(block) for block in blocks])
+    sets = {name: [np.zeros(0, int), np.flatnonzero(owner == name)] for name in dict.fromkeys(names.values())}
+    return meshio.Mesh(points, [("quad", index[quads]), ("line", np.concatenate(blocks))], cell_sets=sets)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Make the meshes of a sample and write them below `cases`."""
+    parser = argparse.ArgumentParser(prog="python -m skfsink.meshing", description=main.__doc__)
+    parser.add_argument("sample", choices=SAMPLES)
+    parser.add_argument("--mesh", default="all", help="name of a mesh, or all of them (default)")
+    parser.add_argument("--output", type=Path, help="folder (default: cases/<sample>/meshes of the checkout)")
+    options = parser.parse_args(arguments)
+    make, settings = SAMPLES[options.sample]
+    if options.mesh != "all" and options.mesh not in settings:
+        parser.error(f"--mesh must be one of {', '.join(settings)} or all")
+    folder = options.output or Path(__file__).resolve().parents[1] / "cases" / options.sample / "meshes"
+    folder.mkdir(parents=True, exist_ok=True)
+    for name in settings if options.mesh == "all" else [options.mesh]:
+        mesh = make(**settings[name])
+        write_mesh(folder / f"{name}.vtu", mesh)
+        quality = scaled_jacobian(mesh.points, mesh.cells_dict["quad"])
+        print(f"{name}: {len(quality)} elements, {len(mesh.points)} nodes, "
+              f"scaled Jacobian >= {quality.min():.3f}, 1 % quantile {np.quantile(quality, 0.01):.3f}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,83 @@
+"""The momentum balance on one mesh: force, stored energy, tangent and mass for a given relative density."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from . import kernels
+from .errors import ParameterError
+from .material import Material
+from .space import Pattern, Space
+
+__all__ = ["ELEMENTS", "Momentum"]
+
+ELEMENTS = ("jbar", "plain")
+
+
+class Momentum:
+    """Internal force and its derivatives (Eq. 14-19, 28) for the relative density last given.
+
+    Parameters
+    ----------
+    space, material: the spaces and the stored energy.
+    element: "jbar" for the element-constant J_bar, "plain" for the standard element.
+    force_floor: Gauss points with gamma below this exert no force. Their stiffness and mass are then gone together.
+
+    Attributes
+    ----------
+    gamma: effective relative density at the Gauss points, zero in deleted elements and below the floor, (ne, nq).
+    energy: gamma-weighted stored energy at the last evaluation [N mm; N mm/mm in 2D].
+    least_J: least J at a Gauss point with gamma > 0 at the last evaluation.
+    evaluations: how often the force was evaluated.
+    """
+
+    def __init__(self, space: Space, material: Material, element: str = "jbar", force_floor: float = 1e-3) -> None:
+        if element not in ELEMENTS:
+            raise ParameterError(f"element must be one of {', '.join(ELEMENTS)}; got {element!r}")
+        self.space, self.material, self.force_floor = space, material, force_floor
+        self.j_bar = element == "jbar"
+        self.tiles = kernels.Tiles(space)
+        self.energy = 0.0
+        self.least_J = 1.0
+        self.evaluations = 0
+        self._constants = material.constants
+        self.gamma = np.ones_like(space.w)
+        self.tiles.set_gamma(self.gamma)
+
+    def effective(self, gamma: np.ndarray, deleted: np.ndarray) -> np.ndarray:
+        """Relative density the force sees (ne, nq), for nodal values `gamma` (n,) and `deleted` elements (ne,)."""
+        at_gauss = self.space.at_gauss(gamma)
+        at_gauss[(at_gauss < self.force_floor) | deleted[:, None]] = 0.0
+        return at_gauss
+
+    def set_gamma(self, gamma: np.ndarray, deleted: np.ndarray) -> None:
+        """Use the nodal relative density `gamma` from now on."""
+        self.gamma = self.effective(gamma, deleted)
+        self.tiles.set_gamma(self.gamma)
+
+    def force(self, u: np.ndarray, out: np.ndarray | None = None) -> np.ndarray:
+        """Internal force at the displacement `u`, (n, dim) [N; N/mm in 2D]. Sets `energy`, `least_J` and `W`."""
+        out = np.empty_like(self.space.X) if out is None else out
+        m = self.material
+        self.least_J = self.tiles.force(self.space.X + u, m.law, self._constants, m.bulk_modulus, out, self.j_bar)
+        self.energy = float(self.tiles.psi.sum())
+        self.evaluations += 1
+        return out
+
+    @property
+    def W(self) -> np.ndarray:
+        """Stored energy density of the undamaged material at the last evaluation [MPa], (ne, nq)."""
+        return self.tiles.untile(self.tiles.W)
+
+    def tangent(self, pattern: Pattern, u: np.ndarray) -> np.ndarray:
+        """Data of the tangent stiffness at `u` on `pattern`."""
+        return kernels.tangent(self.space, pattern, self.material, u, self.gamma, self.j_bar)
+
+    def consistent_mass(self, pattern: Pattern) -> np.ndarray:
+        """Data of the mass matrix of Eq. (28) on `pattern`."""
+        return kernels.mass(self.space, pattern, self.gamma, self.material.rho0)
+
+    def lumped_mass(self, floor: float) -> np.ndarray:
+        """Row sums (n,) [t; t/mm in 2D] of Eq. (28), at least `floor` times those of the intact solid."""
+        intact = self.space.lump(np.ones_like(self.gamma)) * self.material.rho0
+        return np.maximum(self.space.lump(self.gamma) * self.material.rho0, floor * intact)

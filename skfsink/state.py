@@ -1,0 +1,51 @@
+"""The fields that evolve."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .energy import Ledger
+from .space import Space
+
+__all__ = ["State"]
+
+
+@dataclass
+class State:
+    """Everything a run needs to go on from where it is; arrays are owned and changed in place or replaced.
+
+    Attributes
+    ----------
+    u, v, a: displacement [mm], velocity [mm/s], acceleration [mm/s^2] of the nodes, (n, dim).
+    gamma: relative density of the nodes, (n,).
+    W_max: greatest stored energy each Gauss point has seen [MPa], (ne, nq); H follows from it (Eq. 10).
+    deleted: failed elements, (ne,) bool.
+    deletions: the ordered log (time, element).
+    grip: displacement of the grips along their velocity, as a time at that velocity [s] (the load clock).
+    time: time since the start of the phase [s].
+    step: steps taken in the phase (load increments, sweeps, time steps).
+    phase: "loading", "event" or "done".
+    ledger: energies of the phase.
+    """
+
+    u: np.ndarray
+    v: np.ndarray
+    a: np.ndarray
+    gamma: np.ndarray
+    W_max: np.ndarray
+    deleted: np.ndarray
+    deletions: list[tuple[float, int]] = field(default_factory=list)
+    grip: float = 0.0
+    time: float = 0.0
+    step: int = 0
+    phase: str = "loading"
+    ledger: Ledger = field(default_factory=Ledger)
+
+    @classmethod
+    def intact(cls, space: Space) -> State:
+        """Undeformed, at rest, gamma = 1."""
+        zero = np.zeros_like(space.X)
+        return cls(zero, zero.copy(), zero.copy(), np.ones(space.n_nodes), np.zeros_like(space.w),
+                   np.zeros(space.n_elements, bool))
