@@ -17,9 +17,8 @@ def delete_failed(space: Space, state: State, threshold: float, failure_energy: 
     (volume) times psi_f is added to U (Eq. 30). Call it on accepted states only: a trial that is given up must not
     leave holes.
     """
-    candidates = np.flatnonzero(~state.deleted & (state.gamma[space.conn].min(axis=1) <= threshold))
-    gamma = state.gamma[space.conn[candidates]] @ space.N.T
-    failed = candidates[(gamma <= threshold).all(axis=1)]
+    spent = space.at_gauss(state.gamma) <= threshold
+    failed = np.flatnonzero(spent.all(axis=1) & ~state.deleted)
     if failed.size:
         state.deleted[failed] = True
         state.deletions.extend((state.time, int(e)) for e in failed)

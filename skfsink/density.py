@@ -54,7 +54,7 @@ class DensitySolver:
         self._laplacian = kernels.laplacian(space, self.pattern, law.length_scale**2)
         self._direct: Factorization | None = None
         self._amg = AmgCG(self.pattern.matrix(self._assemble(np.ones_like(space.w))), tolerance)
-        self._last: np.ndarray | None = None
+        self.last_sink: np.ndarray | None = None  #: coefficients of the last solve, (ne, nq)
         self.solves = self.skipped = self.iterations = self.fallbacks = 0
 
     @property
@@ -76,7 +76,7 @@ class DensitySolver:
             The solution is not finite, or the lumped one leaves (0, 1] by more than the solver's tolerance.
         """
         sink = 1.0 / (self.law.history(W_max) + self.law.epsilon)
-        if self._last is not None and np.all(np.abs(sink - self._last) <= self.unchanged * self._last):
+        if self.last_sink is not None and np.all(np.abs(sink - self.last_sink) <= self.unchanged * self.last_sink):
             self.skipped += 1
             return gamma
         self.solves += 1
@@ -92,8 +92,16 @@ class DensitySolver:
         if self.sink != "consistent" and not (result.min() > -1e-9 and result.max() < 1 + 1e-6):
             raise ConvergenceError(f"the relative density left (0, 1]: {result.min():.3g} to {result.max():.6g}; the "
                                    f"mesh has elements so flat that the lumped sink loses its maximum principle")
-        self._last = sink
+        self.last_sink = sink
         return result
+
+    def memory(self) -> dict[str, np.ndarray]:
+        """What the solver remembers, for a checkpoint."""
+        return {} if self.last_sink is None else {"last_sink": self.last_sink}
+
+    def restore(self, memory: dict[str, np.ndarray]) -> None:
+        """Take up what :meth:`memory` gave."""
+        self.last_sink = memory.get("last_sink")
 
     def _assemble(self, sink: np.ndarray) -> np.ndarray:
         if self.sink == "consistent":

@@ -123,6 +123,7 @@ class Explicit:
         self._W = self.momentum.tiles.W
         self._W_max = self.momentum.tiles.tile(state.W_max)
         self._elastic = self.momentum.energy
+        self._spare = np.empty_like(self.reaction)
 
     def begin(self, state: State) -> None:
         """Set the body in motion: accelerations from the forces, energies of the start."""
@@ -148,12 +149,12 @@ class Explicit:
         if self._mode is None or state.step % self.CHECK == 0:
             self._set_step(state)
         dt = self.dt
-        old = np.where(self._free, -self.mass[:, None] * state.a, self.reaction)
+        old = self.reaction
         du = _move(state.u, state.v, state.a, self._free, self._grip_velocity, dt)
-        force = self.momentum.force(state.u)
+        force = self.momentum.force(state.u, self._spare)
         np.maximum(self._W_max, self._W, out=self._W_max)
         trapezoid, held, kinetic, swing = _kick(state.v, state.a, self._free, self.mass, old, force, du, dt)
-        self.reaction = force
+        self.reaction, self._spare = force, old
         ledger = state.ledger
         elastic = self.momentum.energy
         ledger.numerical += trapezoid - (elastic - self._elastic) - dt * dt / 8 * swing
@@ -172,7 +173,7 @@ class Explicit:
     def update_density(self, state: State) -> None:
         """Solve for gamma from the history, book what the sink takes, delete failed elements."""
         momentum, ledger = self.momentum, state.ledger
-        state.W_max = momentum.tiles.untile(self._W_max)
+        self.sync(state)
         solves = self.density.solves
         state.gamma = self.density.solve(state.W_max, state.gamma)
         if self.density.solves == solves:
@@ -190,6 +191,10 @@ class Explicit:
         self._elastic -= stored
         ledger.elastic = self._elastic
         ledger.kinetic = self._kinetic(state)
+
+    def sync(self, state: State) -> None:
+        """Bring `state.W_max` up to date; between density solves the integrator keeps it tiled."""
+        state.W_max = self.momentum.tiles.untile(self._W_max)
 
     # --- the step size ---
     def _set_step(self, state: State) -> None:
@@ -248,12 +253,13 @@ def _kick(v, a, free, mass, old, force, du, dt):  # type: ignore[no-untyped-def]
     work, held, kinetic, swing = 0.0, 0.0, 0.0, 0.0
     for n in range(v.shape[0]):
         for i in range(v.shape[1]):
-            step_work = 0.5 * (old[n, i] + force[n, i]) * du[n, i]
+            f0 = -mass[n] * a[n, i] if free[n, i] else old[n, i]
+            step_work = 0.5 * (f0 + force[n, i]) * du[n, i]
             work += step_work
             if free[n, i]:
                 a[n, i] = -force[n, i] / mass[n]
                 v[n, i] += 0.5 * dt * a[n, i]
-                swing += (force[n, i] ** 2 - old[n, i] ** 2) / mass[n]
+                swing += (force[n, i] ** 2 - f0**2) / mass[n]
             else:
                 held += step_work
             kinetic += 0.5 * mass[n] * v[n, i] ** 2

@@ -309,6 +309,9 @@ class HHT:
         ledger.elastic = momentum.energy
         self._inertia, self._W, self._gamma = inertia, momentum.W, momentum.gamma
 
+    def sync(self, state: State) -> None:
+        """Nothing to do: the state is complete after every step."""
+
     def memory(self) -> dict[str, np.ndarray]:
         """What the integrator remembers beyond the state, for a checkpoint."""
         return {"inertia": self._inertia, "scalars": np.array([self.dt, self.rejected, self.iterations])}

@@ -61,7 +61,8 @@ def _history(W, inverse_phi, m, negligible, H):  # type: ignore[no-untyped-def]
         if r < negligible:     # r^m < exp(-40) is nothing beside 1 in double precision
             H[i] = 1.0
         else:
-            H[i] = np.exp(-(r**m))
+            x = r**m
+            H[i] = np.exp(-x) if x > 1e-8 else 1.0 - x
 
 
 @dataclass(frozen=True)
@@ -236,7 +237,8 @@ class SinkLaw:
         """H = exp(-(W/Phi)^m) of Eq. (10). H falls as W grows, so the least H is that of the greatest W."""
         W = np.asarray(W, float)
         H = np.empty(W.size)
-        _history(W.ravel(), 1 / self.phi, self.m, float(np.exp(-40 / self.m)), H)
+        m = int(self.m) if float(self.m).is_integer() else self.m  # integer powers are products, five times as fast
+        _history(W.ravel(), 1 / self.phi, m, float(np.exp(-40 / self.m)), H)
         return H.reshape(W.shape)
 
     @property

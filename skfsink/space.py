@@ -152,7 +152,9 @@ class Space:
     # --- operators ---
     def at_gauss(self, nodal: np.ndarray) -> np.ndarray:
         """Values (ne, nq) at the Gauss points of the Q1 field with nodal values (n,)."""
-        return nodal[self.conn] @ self.N.T
+        out = np.empty_like(self.w)
+        _at_gauss(np.ascontiguousarray(nodal, float), self._nodes, self.N, out)
+        return out
 
     def gradient(self, nodal: np.ndarray) -> np.ndarray:
         """Gradient (ne, nq, ..., dim) of the Q1 field with nodal values (n, ...)."""
@@ -171,8 +173,14 @@ class Space:
 
     def lump(self, values: np.ndarray) -> np.ndarray:
         """Row sums of the mass matrix with weight `values` (ne, nq):  sum_q w_q values_q N_a(q), (n,)."""
-        local = (self.w * values) @ self.N
-        return np.bincount(self.conn.ravel(), local.ravel(), minlength=self.n_nodes)
+        out = np.zeros(self.n_nodes)
+        _lump(self.w, np.ascontiguousarray(values, float), self._nodes, self.N, out)
+        return out
+
+    @cached_property
+    def _nodes(self) -> np.ndarray:
+        """`conn` unsigned, which spares the compiled loops a test for negative indices."""
+        return self.conn.astype(np.uint32)
 
     @cached_property
     def incidence(self) -> tuple[np.ndarray, np.ndarray]:
@@ -264,6 +272,28 @@ class Pattern:
 def _diagonal(matrix: csr_array) -> csr_array:
     n = matrix.shape[0]
     return csr_array((matrix.diagonal(), (np.arange(n), np.arange(n))), shape=(n, n))
+
+
+@njit(cache=True)
+def _at_gauss(nodal, conn, N, out):  # type: ignore[no-untyped-def]
+    nq, na = N.shape
+    for e in range(conn.shape[0]):
+        for q in range(nq):
+            total = 0.0
+            for a in range(na):
+                total += N[q, a] * nodal[conn[e, a]]
+            out[e, q] = total
+
+
+@njit(cache=True)
+def _lump(w, values, conn, N, out):  # type: ignore[no-untyped-def]
+    nq, na = N.shape
+    for e in range(conn.shape[0]):
+        for a in range(na):
+            total = 0.0
+            for q in range(nq):
+                total += w[e, q] * values[e, q] * N[q, a]
+            out[conn[e, a]] += total
 
 
 @njit(cache=True)

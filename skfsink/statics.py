@@ -8,7 +8,6 @@ analysis would turn into motion.
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -81,6 +80,7 @@ class Statics:
         self.solver = Factorization(self.pattern, threads=threads)
         self._volume = self.space.lump(np.ones_like(self.space.w))
         self.newton_steps = 0
+        self.increment = 0.0      #: current load increment, as load time [s]; 0 before the first
         self._stale = True
 
     # --- equilibrium at fixed gamma ---
@@ -185,8 +185,8 @@ class Statics:
         c = self.controls
         size = float(np.ptp(self.space.X, axis=0).max())
         speed = float(np.abs(self.grip_velocity).max())
-        first = c.increment * size / speed
-        increment = first
+        if self.increment == 0.0:
+            self.increment = c.increment * size / speed
         ledger = state.ledger
         held = ~self.free.reshape(state.u.shape)
         self.momentum.set_gamma(state.gamma, state.deleted)
@@ -195,12 +195,12 @@ class Statics:
         while True:
             self.momentum.set_gamma(state.gamma, state.deleted)
             try:
-                settled = self._settle(state, self._predict(state.u, increment))
+                settled = self._settle(state, self._predict(state.u, self.increment))
             except ConvergenceError:
                 settled = None
             if settled is None:
-                increment *= 0.5
-                if increment <= c.onset_tolerance * (state.grip + increment):
+                self.increment *= 0.5
+                if self.increment <= c.onset_tolerance * (state.grip + self.increment):
                     if state.grip == 0.0:
                         raise ConvergenceError("the body finds no equilibrium under the smallest load increment")
                     self.momentum.set_gamma(state.gamma, state.deleted)
@@ -213,7 +213,7 @@ class Statics:
             ledger.drop(self.space.w, 0.5 * (W + W_new), before, self.momentum.gamma)
             state.u, state.gamma, state.W_max = u, gamma, W_max
             force, W = new_force, W_new
-            state.grip += increment
+            state.grip += self.increment
             state.time = state.grip
             state.step += 1
             self.momentum.force(state.u)
@@ -236,6 +236,7 @@ class Statics:
             self.momentum.set_gamma(state.gamma, state.deleted)
             self.momentum.force(state.u)
             before = self.momentum.energy
+            self._stale = True  # so that a sweep depends on the state alone
             state.u, _ = self.equilibrium(state.u)
             ledger.released += before - self.momentum.energy
             W = self.momentum.W
@@ -245,6 +246,7 @@ class Statics:
             old = self.momentum.gamma
             state.gamma = gamma
             state.step += 1
+            state.time = float(state.step)
             undeleted = self.momentum.effective(gamma, state.deleted)
             delete_failed(self.space, state, self.deletion, self.density.law.failure_energy)
             self.momentum.set_gamma(gamma, state.deleted)
@@ -255,6 +257,12 @@ class Statics:
             if change <= self.controls.gamma_tolerance:
                 return
 
-    def snapshot(self, state: State) -> State:
-        """An independent copy of `state`."""
-        return copy.deepcopy(state)
+    # --- checkpoints ---
+    def memory(self) -> dict[str, np.ndarray]:
+        """What loading remembers beyond the state."""
+        return {"increment": np.array(self.increment)}
+
+    def restore(self, memory: dict[str, np.ndarray]) -> None:
+        """Take up what :meth:`memory` gave."""
+        self.increment = float(memory["increment"])
+        self._stale = True

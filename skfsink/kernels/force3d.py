@@ -11,8 +11,9 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from .force2d import _SIGNATURE, least_live
-from .lanes import FAST, GAUSS_HIGH, GAUSS_LOW, J_FLOOR, LANES, guess_inverse_cbrt, refine_inverse_cbrt
+from .force2d import _SIGNATURE, _add, _dilatation_plain, least_live
+from .lanes import FAST, GAUSS_HIGH, GAUSS_LOW, J_FLOOR, guess_inverse_cbrt, refine_inverse_cbrt
+from .lanes import LANES_3D as LANES
 
 # edges in direction d: first nodes; the second node is 2^d further. Edge m is at (m & 1, m >> 1) across.
 _EDGES = np.array([[0, 2, 4, 6], [0, 1, 4, 5], [0, 1, 2, 3]])
@@ -47,125 +48,187 @@ def _mix(c0, c1, c2, c3, a, b, c, d, out):  # type: ignore[no-untyped-def]
 
 
 @njit(fastmath=FAST)
-def _push(g0, g1, g2, k, F, J, tr):  # type: ignore[no-untyped-def]
-    """F = sum_d (dx/dxi_d) (dxi_d/dX) of one Gauss point; g* (3, L), k (9 L), F (9 L)."""
-    L = LANES
-    for i in range(L):
-        k0, k1, k2, k3, k4 = k[i], k[L + i], k[2 * L + i], k[3 * L + i], k[4 * L + i]
-        k5, k6, k7, k8 = k[5 * L + i], k[6 * L + i], k[7 * L + i], k[8 * L + i]
-        a, b, c = g0[i], g1[i], g2[i]
-        f0, f1, f2 = a * k0 + b * k3 + c * k6, a * k1 + b * k4 + c * k7, a * k2 + b * k5 + c * k8
-        a, b, c = g0[L + i], g1[L + i], g2[L + i]
-        f3, f4, f5 = a * k0 + b * k3 + c * k6, a * k1 + b * k4 + c * k7, a * k2 + b * k5 + c * k8
-        a, b, c = g0[2 * L + i], g1[2 * L + i], g2[2 * L + i]
-        f6, f7, f8 = a * k0 + b * k3 + c * k6, a * k1 + b * k4 + c * k7, a * k2 + b * k5 + c * k8
-        F[i], F[L + i], F[2 * L + i] = f0, f1, f2
-        F[3 * L + i], F[4 * L + i], F[5 * L + i] = f3, f4, f5
-        F[6 * L + i], F[7 * L + i], F[8 * L + i] = f6, f7, f8
-        J[i] = f0 * (f4 * f8 - f5 * f7) - f1 * (f3 * f8 - f5 * f6) + f2 * (f3 * f7 - f4 * f6)
+def _copy(a, out):  # type: ignore[no-untyped-def]
+    for i in range(LANES):
+        out[i] = a[i]
+
+
+@njit(fastmath=FAST)
+def _push(g, k, F):  # type: ignore[no-untyped-def]
+    """One row of F, F_iJ = sum_d (dx_i/dxi_d) (dxi_d/dX_J), at all Gauss points; g (3, Q), k (9, Q), F (3, Q)."""
+    Q = 8 * LANES
+    for i in range(Q):
+        a, b, c = g[i], g[Q + i], g[2 * Q + i]
+        F[i] = a * k[i] + b * k[3 * Q + i] + c * k[6 * Q + i]
+        F[Q + i] = a * k[Q + i] + b * k[4 * Q + i] + c * k[7 * Q + i]
+        F[2 * Q + i] = a * k[2 * Q + i] + b * k[5 * Q + i] + c * k[8 * Q + i]
+
+
+@njit(fastmath=FAST)
+def _invariants(F, J, floored, tr):  # type: ignore[no-untyped-def]
+    Q = 8 * LANES
+    for i in range(Q):
+        f0, f1, f2, f3, f4 = F[i], F[Q + i], F[2 * Q + i], F[3 * Q + i], F[4 * Q + i]
+        f5, f6, f7, f8 = F[5 * Q + i], F[6 * Q + i], F[7 * Q + i], F[8 * Q + i]
+        det = f0 * (f4 * f8 - f5 * f7) - f1 * (f3 * f8 - f5 * f6) + f2 * (f3 * f7 - f4 * f6)
+        J[i] = det
+        floored[i] = det if det > J_FLOOR else J_FLOOR
         tr[i] = f0 * f0 + f1 * f1 + f2 * f2 + f3 * f3 + f4 * f4 + f5 * f5 + f6 * f6 + f7 * f7 + f8 * f8
 
 
 @njit(fastmath=FAST)
-def _stress(k, F, a, b, t):  # type: ignore[no-untyped-def]
-    """Pulled-back stress T_id = P_iJ dxi_d/dX_J of one Gauss point into t (9 L), rows d*3 + i."""
+def _means(w, J, gamma, mean):  # type: ignore[no-untyped-def]
+    """Rows of mean: V, V J_bar, V gamma_bar."""
+    L = LANES
+    for i in range(3 * L):
+        mean[i] = 0.0
+    for q in range(8):
+        for i in range(L):
+            mean[i] += w[q * L + i]
+        for i in range(L):
+            mean[L + i] += w[q * L + i] * J[q * L + i]
+        for i in range(L):
+            mean[2 * L + i] += w[q * L + i] * gamma[q * L + i]
+
+
+@njit(fastmath=FAST)
+def _dilatation(mean, k_bulk, pressure, volumetric):  # type: ignore[no-untyped-def]
     L = LANES
     for i in range(L):
-        f0, f1, f2, f3, f4 = F[i], F[L + i], F[2 * L + i], F[3 * L + i], F[4 * L + i]
-        f5, f6, f7, f8 = F[5 * L + i], F[6 * L + i], F[7 * L + i], F[8 * L + i]
-        A, B = a[i], b[i]
-        p0, p1, p2 = A * f0 + B * (f4 * f8 - f5 * f7), A * f1 + B * (f5 * f6 - f3 * f8), A * f2 + B * (f3 * f7 - f4 * f6)
-        p3, p4, p5 = A * f3 + B * (f2 * f7 - f1 * f8), A * f4 + B * (f0 * f8 - f2 * f6), A * f5 + B * (f1 * f6 - f0 * f7)
-        p6, p7, p8 = A * f6 + B * (f1 * f5 - f2 * f4), A * f7 + B * (f2 * f3 - f0 * f5), A * f8 + B * (f0 * f4 - f1 * f3)
-        for d in range(3):
-            k0, k1, k2 = k[3 * d * L + i], k[(3 * d + 1) * L + i], k[(3 * d + 2) * L + i]
-            t[3 * d * L + i] = p0 * k0 + p1 * k1 + p2 * k2
-            t[(3 * d + 1) * L + i] = p3 * k0 + p4 * k1 + p5 * k2
-            t[(3 * d + 2) * L + i] = p6 * k0 + p7 * k1 + p8 * k2
+        dilatation = mean[L + i] / mean[i] - 1.0
+        pressure[i] = mean[2 * L + i] / mean[i] * k_bulk * dilatation
+        volumetric[i] = 0.5 * k_bulk * dilatation * dilatation
+    for q in range(1, 8):
+        for i in range(L):
+            pressure[q * L + i] = pressure[i]
+        for i in range(L):
+            volumetric[q * L + i] = volumetric[i]
 
 
 @njit(fastmath=FAST)
-def _coefficients(w, gamma, dpsi, R, tr, Jf, p, a, b):  # type: ignore[no-untyped-def]
+def _coefficients(w, gamma, dpsi, R, pressure, ab):  # type: ignore[no-untyped-def]
+    Q = 8 * LANES
+    for i in range(Q):
+        ab[i] = 2.0 * w[i] * gamma[i] * dpsi[i] * R[i]
+        ab[Q + i] = w[i] * pressure[i]
+
+
+@njit(fastmath=FAST)
+def _deviator(ab, tr, floored):  # type: ignore[no-untyped-def]
+    Q = 8 * LANES
+    for i in range(Q):
+        ab[Q + i] -= ab[i] * tr[i] / floored[i] * (1 / 3.0)
+
+
+@njit(fastmath=FAST)
+def _piola(F, ab, P):  # type: ignore[no-untyped-def]
+    Q = 8 * LANES
+    for i in range(Q):
+        A, B = ab[i], ab[Q + i]
+        f0, f1, f2, f3, f4 = F[i], F[Q + i], F[2 * Q + i], F[3 * Q + i], F[4 * Q + i]
+        f5, f6, f7, f8 = F[5 * Q + i], F[6 * Q + i], F[7 * Q + i], F[8 * Q + i]
+        P[i] = A * f0 + B * (f4 * f8 - f5 * f7)
+        P[Q + i] = A * f1 + B * (f5 * f6 - f3 * f8)
+        P[2 * Q + i] = A * f2 + B * (f3 * f7 - f4 * f6)
+        P[3 * Q + i] = A * f3 + B * (f2 * f7 - f1 * f8)
+        P[4 * Q + i] = A * f4 + B * (f0 * f8 - f2 * f6)
+        P[5 * Q + i] = A * f5 + B * (f1 * f6 - f0 * f7)
+        P[6 * Q + i] = A * f6 + B * (f1 * f5 - f2 * f4)
+        P[7 * Q + i] = A * f7 + B * (f2 * f3 - f0 * f5)
+        P[8 * Q + i] = A * f8 + B * (f0 * f4 - f1 * f3)
+
+
+@njit(fastmath=FAST)
+def _pull(P, k, t):  # type: ignore[no-untyped-def]
+    """One row of T_id = P_iJ dxi_d/dX_J; P (3, Q), k (9, Q), t (3, Q)."""
+    Q = 8 * LANES
+    for i in range(Q):
+        a, b, c = P[i], P[Q + i], P[2 * Q + i]
+        t[i] = a * k[i] + b * k[Q + i] + c * k[2 * Q + i]
+        t[Q + i] = a * k[3 * Q + i] + b * k[4 * Q + i] + c * k[5 * Q + i]
+        t[2 * Q + i] = a * k[6 * Q + i] + b * k[7 * Q + i] + c * k[8 * Q + i]
+
+
+@njit(fastmath=FAST)
+def _product(a, b, out):  # type: ignore[no-untyped-def]
+    for i in range(a.size):
+        out[i] = a[i] * b[i]
+
+
+@njit(fastmath=FAST)
+def _energy(w, gamma, W, psi):  # type: ignore[no-untyped-def]
     for i in range(LANES):
-        a[i] = 2.0 * w[i] * gamma[i] * dpsi[i] * R[i]
-        b[i] = w[i] * p[i] - a[i] * tr[i] / Jf[i] * (1 / 3.0)
+        psi[i] = 0.0
+    for q in range(8):
+        for i in range(LANES):
+            psi[i] += w[q * LANES + i] * gamma[q * LANES + i] * W[q * LANES + i]
 
 
 @njit(fastmath=FAST)
-def _add(a, out):  # type: ignore[no-untyped-def]
+def _add_to(a, out):  # type: ignore[no-untyped-def]
     for i in range(a.size):
         out[i] += a[i]
 
 
 @njit(fastmath=FAST)
-def _sub(a, out):  # type: ignore[no-untyped-def]
+def _subtract_from(a, out):  # type: ignore[no-untyped-def]
     for i in range(a.size):
         out[i] -= a[i]
 
 
 @njit(_SIGNATURE, cache=True, fastmath=FAST, nogil=True)
 def force_3d(law, constants, k_bulk, conn, x, geometry, gamma, j_bar, force, W, psi):  # type: ignore[no-untyped-def]
-    L = LANES
-    z, edge, G, S = np.empty((24, L)), np.empty((4, L)), np.empty((12, 3, L)), np.empty((12, 3, L))
-    F, J, tr, Jf, I1, R = np.empty((8, 9, L)), np.empty((8, L)), np.empty((8, L)), np.empty((8, L)), \
-        np.empty((8, L)), np.empty((8, L))
-    e, de, dde, t = np.empty((8, L)), np.empty((8, L)), np.empty((8, L)), np.empty(9 * L)
-    p, vol, a, b, mean, gbar, V = np.empty((8, L)), np.empty((8, L)), np.empty(L), np.empty(L), np.empty(L), \
-        np.empty(L), np.empty(L)
+    L, Q = LANES, 8 * LANES
+    z, edge, line = np.empty((24, L)), np.empty((4, L)), np.empty((4, L))
+    g, F, P, t = np.empty((3, 3, 8, L)), np.empty(9 * Q), np.empty(9 * Q), np.empty((3, 3, 8, L))
+    J, floored, tr, R, I1 = np.empty(Q), np.empty(Q), np.empty(Q), np.empty(Q), np.empty(Q)
+    psi_q, dpsi, ddpsi, ab, mean = np.empty(Q), np.empty(Q), np.empty(Q), np.empty(2 * Q), np.empty(3 * L)
+    pressure, volumetric = np.empty(Q), np.empty(Q)
     least = 1.0
     M = _INTERPOLATE
     for tile in range(conn.shape[0]):
-        geo, g = geometry[tile], gamma[tile]
+        geo, gam = geometry[tile].reshape(-1), gamma[tile].reshape(-1)
+        w = geo[9 * Q:]
         _gather(conn[tile], x, z)
-        for d in range(3):
-            for c in range(3):
+        for c in range(3):
+            for d in range(3):
                 for m in range(4):
                     n0 = _EDGES[d, m]
                     _difference(z[3 * n0 + c], z[3 * (n0 + (1 << d)) + c], edge[m])
                 for f in range(4):
-                    _mix(M[f, 0], M[f, 1], M[f, 2], M[f, 3], edge[0], edge[1], edge[2], edge[3], G[4 * d + f, c])
-        mean[:] = 0.0
-        gbar[:] = 0.0
-        V[:] = 0.0
-        for q in range(8):
-            _push(G[_LINE[0, q]].reshape(-1), G[4 + _LINE[1, q]].reshape(-1), G[8 + _LINE[2, q]].reshape(-1),
-                  geo[10 * q:10 * q + 9].reshape(-1), F[q].reshape(-1), J[q], tr[q])
-            w = geo[10 * q + 9]
-            for i in range(L):
-                Jf[q, i] = J[q, i] if J[q, i] > J_FLOOR else J_FLOOR
-                mean[i] += w[i] * J[q, i]
-                gbar[i] += w[i] * g[q, i]
-                V[i] += w[i]
-        least = least_live(J.reshape(-1), g.reshape(-1), least)
-        guess_inverse_cbrt(Jf.reshape(-1).view(np.int64), R.reshape(-1).view(np.int64))
-        refine_inverse_cbrt(Jf.reshape(-1), R.reshape(-1))
-        for q in range(8):
-            for i in range(L):
-                I1[q, i] = R[q, i] * tr[q, i]
-                dilatation = (mean[i] / V[i] if j_bar else J[q, i]) - 1.0
-                p[q, i] = (gbar[i] / V[i] if j_bar else g[q, i]) * k_bulk * dilatation
-                vol[q, i] = 0.5 * k_bulk * dilatation * dilatation
-        law(I1.reshape(-1), constants, e.reshape(-1), de.reshape(-1), dde.reshape(-1))
-        S[:] = 0.0
-        energy, density = psi[tile], W[tile]
-        energy[:] = 0.0
-        for q in range(8):
-            w = geo[10 * q + 9]
-            _coefficients(w, g[q], de[q], R[q], tr[q], Jf[q], p[q], a, b)
-            _stress(geo[10 * q:10 * q + 9].reshape(-1), F[q].reshape(-1), a, b, t)
-            for d in range(3):
-                _add(t[3 * d * L:3 * (d + 1) * L], S[4 * d + _LINE[d, q]].reshape(-1))
-            for i in range(L):
-                density[q, i] = e[q, i] + vol[q, i]
-                energy[i] += w[i] * g[q, i] * density[q, i]
+                    _mix(M[f, 0], M[f, 1], M[f, 2], M[f, 3], edge[0], edge[1], edge[2], edge[3], line[f])
+                for q in range(8):
+                    _copy(line[_LINE[d, q]], g[c, d, q])
+            _push(g[c].reshape(-1), geo, F[3 * c * Q:3 * (c + 1) * Q])
+        _invariants(F, J, floored, tr)
+        least = least_live(J, gam, least)
+        guess_inverse_cbrt(floored.view(np.int64), R.view(np.int64))
+        refine_inverse_cbrt(floored, R)
+        _product(R, tr, I1)
+        law(I1, constants, psi_q, dpsi, ddpsi)
+        if j_bar:
+            _means(w, J, gam, mean)
+            _dilatation(mean, k_bulk, pressure, volumetric)
+        else:
+            _dilatation_plain(gam, k_bulk, J, pressure, volumetric)
+        _coefficients(w, gam, dpsi, R, pressure, ab)
+        _deviator(ab, tr, floored)
+        _piola(F, ab, P)
+        for c in range(3):
+            _pull(P[3 * c * Q:3 * (c + 1) * Q], geo, t[c].reshape(-1))
+        density = W[tile].reshape(-1)
+        _add(psi_q, volumetric, density)
+        _energy(w, gam, density, psi[tile])
         out = force[tile]
         out[:] = 0.0
-        for d in range(3):
-            for c in range(3):
+        for c in range(3):
+            for d in range(3):
+                line[:] = 0.0
+                for q in range(8):
+                    _add_to(t[c, d, q], line[_LINE[d, q]])
                 for m in range(4):
                     n0 = _EDGES[d, m]
-                    _mix(M[0, m], M[1, m], M[2, m], M[3, m], S[4 * d, c], S[4 * d + 1, c], S[4 * d + 2, c],
-                         S[4 * d + 3, c], edge[m])
-                    _add(edge[m], out[3 * (n0 + (1 << d)) + c])
-                    _sub(edge[m], out[3 * n0 + c])
+                    _mix(M[0, m], M[1, m], M[2, m], M[3, m], line[0], line[1], line[2], line[3], edge[m])
+                    _add_to(edge[m], out[3 * (n0 + (1 << d)) + c])
+                    _subtract_from(edge[m], out[3 * n0 + c])
     return least

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-LANES = 64             #: elements in a tile
+LANES = 64             #: quadrilaterals in a tile
+LANES_3D = 16          #: hexahedra in a tile; their working set is eight times as large
 J_FLOOR = 0.02         #: J below this is read as this; only points without stiffness get there
 FAST = {"contract", "arcp", "nsz", "reassoc"}  #: floating-point freedoms that keep NaN and infinity as they are
 

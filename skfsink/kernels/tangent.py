@@ -117,7 +117,7 @@ def _make(dim: int) -> Callable[..., Any]:
                 if j_bar:
                     wpJ, wkJJ = w[e, q] * gamma_bar * k_bulk * (mean - 1.0) * J[q], 0.0
                 else:
-                    wpJ, wkJJ = wg * k_bulk * (J[q] - 1.0) * J[q], wg * k_bulk * J[q] * J[q]
+                    wpJ, wkJJ = wg * k_bulk * (J[q] - 1.0) * J[q], wg * k_bulk * max(J[q], J_FLOOR) ** 2
                 straight = 0.5 * (4.0 / 9.0 * tr[q] * c1 + wpJ + wkJJ)
                 crossed = 2.0 / 3.0 * tr[q] * c1 - wpJ
                 soft = w[e, q] * ERSATZ_STIFFNESS * mu if gamma[e, q] < SOFT_GAMMA else 0.0

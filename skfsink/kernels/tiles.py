@@ -1,7 +1,7 @@
-"""Element data in tiles of `LANES` elements, so that the force loops run on whole vector registers.
+"""Element data in tiles of neighbouring elements, so that the force loops run on whole vector registers.
 
-Element e sits in lane e % LANES of tile e // LANES. An array with `rows` numbers for each element is stored as
-(tiles, rows, LANES): the same number of neighbouring elements is contiguous, and one tile's working set stays in the
+Element e sits in lane e % lanes of tile e // lanes. An array with `rows` numbers for each element is stored as
+(tiles, rows, lanes): the same number of neighbouring elements is contiguous, and one tile's working set stays in the
 first-level cache. The last tile is filled up with copies of the last element that carry gamma = 0 and are never read.
 
 Bytes an explicit step has to move for one quadrilateral (hexahedron): 16 (32) connectivity, 160 (640) geometry,
@@ -18,9 +18,9 @@ from numba import njit
 from ..space import Space
 from .force2d import force_2d
 from .force3d import force_3d
-from .lanes import LANES
+from .lanes import LANES, LANES_3D
 
-__all__ = ["LANES", "Tiles"]
+__all__ = ["Tiles"]
 
 
 class Tiles:
@@ -30,41 +30,43 @@ class Tiles:
     ----------
     gamma: relative density at the Gauss points as the force uses it, tiled; set with :meth:`set_gamma`.
     W: stored energy density of Eq. (31) [MPa] at the last evaluation, tiled.
-    psi: gamma-weighted stored energy of each element [N mm, or N mm/mm in 2D] at the last evaluation, (tiles, LANES).
+    psi: gamma-weighted stored energy of each element [N mm, or N mm/mm in 2D] at the last evaluation, (tiles, lanes).
+    lanes: elements in a tile.
     """
 
     def __init__(self, space: Space) -> None:
         self.space = space
         ne, na, dim = space.n_elements, space.conn.shape[1], space.dim
-        self.count = -(-ne // LANES)
+        self.lanes = LANES if dim == 2 else LANES_3D
+        self.count = -(-ne // self.lanes)
         geometry = np.concatenate([space.invJ.reshape(ne, na, dim * dim), space.w[:, :, None]], axis=2)
         self.conn = self.tile(space.conn).astype(np.uint32)
-        self.geometry = self.tile(geometry.reshape(ne, -1))
-        self.gamma = np.zeros((self.count, na, LANES))
-        self.W = np.zeros((self.count, na, LANES))
-        self.psi = np.zeros((self.count, LANES))
-        self._force = np.zeros((self.count, na * dim, LANES))
+        self.geometry = self.tile(geometry.transpose(0, 2, 1).reshape(ne, -1))  # by component, then Gauss point
+        self.gamma = np.zeros((self.count, na, self.lanes))
+        self.W = np.zeros((self.count, na, self.lanes))
+        self.psi = np.zeros((self.count, self.lanes))
+        self._force = np.zeros((self.count, na * dim, self.lanes))
         self._kernel: Callable[..., float] = force_2d if dim == 2 else force_3d
         start, entry = space.incidence
         element, local = np.divmod(entry, na)
-        tile, lane = np.divmod(element, LANES)
-        self._start = start
-        self._offset = ((tile * na + local) * dim) * LANES + lane
+        tile, lane = np.divmod(element, self.lanes)
+        self._start = start.astype(np.uint32)
+        self._offset = (((tile * na + local) * dim) * self.lanes + lane).astype(np.uint32)
 
     def tile(self, values: np.ndarray) -> np.ndarray:
-        """(ne, rows) as tiles (count, rows, LANES)."""
-        pad = self.count * LANES - len(values)
+        """(ne, rows) as tiles (count, rows, lanes)."""
+        pad = self.count * self.lanes - len(values)
         full = np.concatenate([values, np.repeat(values[-1:], pad, axis=0)])
-        return np.ascontiguousarray(full.reshape(self.count, LANES, -1).transpose(0, 2, 1))
+        return np.ascontiguousarray(full.reshape(self.count, self.lanes, -1).transpose(0, 2, 1))
 
     def untile(self, values: np.ndarray) -> np.ndarray:
-        """Tiles (count, rows, LANES) back as (ne, rows)."""
+        """Tiles (count, rows, lanes) back as (ne, rows)."""
         return np.ascontiguousarray(values.transpose(0, 2, 1)).reshape(-1, values.shape[1])[:self.space.n_elements]
 
     def set_gamma(self, gamma: np.ndarray) -> None:
         """Give the force loops new relative densities at the Gauss points, (ne, nq)."""
         self.gamma[...] = self.tile(gamma)
-        used = self.space.n_elements - (self.count - 1) * LANES
+        used = self.space.n_elements - (self.count - 1) * self.lanes
         self.gamma[-1, :, used:] = 0.0
 
     def force(self, x: np.ndarray, law: Callable[..., None], constants: np.ndarray, bulk_modulus: float,
@@ -76,16 +78,23 @@ class Tiles:
         """
         least = self._kernel(law, constants, bulk_modulus, self.conn, x, self.geometry, self.gamma, j_bar,
                              self._force, self.W, self.psi)
-        _sum_at_nodes(self._force.reshape(-1), self._start, self._offset, out)
+        _sum_at_nodes(self._force.reshape(-1), self._start, self._offset, self.lanes, out)
         return float(least)
 
 
 @njit(cache=True)
-def _sum_at_nodes(local, start, offset, out):  # type: ignore[no-untyped-def]
+def _sum_at_nodes(local, start, offset, lanes, out):  # type: ignore[no-untyped-def]
     n, dim = out.shape
+    two = np.uint32(2 * lanes)
     for a in range(n):
-        for i in range(dim):
-            out[a, i] = 0.0
+        f0, f1, f2 = 0.0, 0.0, 0.0
         for k in range(start[a], start[a + 1]):
-            for i in range(dim):
-                out[a, i] += local[offset[k] + i * LANES]
+            at = offset[k]
+            f0 += local[at]
+            f1 += local[at + np.uint32(lanes)]
+            if dim == 3:
+                f2 += local[at + two]
+        out[a, 0] = f0
+        out[a, 1] = f1
+        if dim == 3:
+            out[a, 2] = f2

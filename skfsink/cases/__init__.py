@@ -1,0 +1,1 @@
+"""The examples of the paper, one function a module: `python -m skfsink.cases.<name>`."""

@@ -1,0 +1,78 @@
+"""Single-edge notched plate in tension (Sec. 5.1): mode I, the crack branches dynamically and not quasi-statically."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..errors import require
+from ..meshing import MESHES, single_edge_notch_mesh
+from ..options import Options
+from ..result import Result
+from ..run import run_case
+from ..sample import load_sample
+from ..scene import Grip, Scene
+
+__all__ = ["single_edge_notch"]
+
+ASSUMED = (
+    "side 4 mm: the paper prints no length of the plate; N h^2 of Table 1 fits 10 to 11 mm^2 of fine mesh",
+    "notch 1 mm long at mid-height: not printed",
+    "notch 0.1 mm = l wide with a round tip: not printed",
+    "fine elements within 1.7 mm of mid-height, 0.11 mm elsewhere: chosen to meet the element counts of Table 1",
+)
+
+
+def single_edge_notch(*, side: float = 4.0, notch: float = 1.0, notch_width: float = 0.1, mesh: str = "M3",
+                      mesh_seed: int = 0, options: Options = Options()) -> Result:  # noqa: B008
+    """Pull a square plate with an edge notch apart, slowly, and watch the crack.
+
+    The grips at the top and bottom edge move apart at `speed` each and hold the plate sideways. The plate is loaded
+    statically to the onset of failure; the crack then crosses it dynamically or quasi-statically.
+
+    Parameters
+    ----------
+    side
+        Side of the plate [mm], > notch.
+    notch
+        Length of the notch up to its round tip, at mid-height [mm], in (notch-width/2, side).
+    notch_width
+        Width of the notch [mm], in (0, side).
+    mesh
+        "coarse", "M3", "M4", "M5" (element size l/1.5, l/3, l/4, l/5), or the path of a mesh file.
+    mesh_seed
+        Another mesh of the same sizes for each number; other than 0 it needs gmsh (the mesh extra).
+    options
+        Material, analysis and controls; see :class:`~skfsink.options.Options`.
+
+    Returns
+    -------
+    Result
+        Summary, history and last state; its files are in the output folder.
+    """
+    require("side", side, "mm", low=0, low_open=True)
+    require("notch-width", notch_width, "mm", low=0, high=side, low_open=True, high_open=True)
+    require("notch", notch, "mm", low=notch_width / 2, high=side, low_open=True, high_open=True)
+    require("mesh-seed", mesh_seed, low=0)
+    own = {"side": side, "notch": notch, "notch_width": notch_width, "mesh": mesh, "mesh_seed": mesh_seed}
+    return run_case("single_edge_notch", _scene, own, options)
+
+
+def _scene(own: dict[str, Any], options: Options) -> Scene:
+    name, seed = str(own["mesh"]), int(own["mesh_seed"])
+    lengths = {k: float(own[k]) for k in ("side", "notch", "notch_width")}
+    make = None
+    if name in MESHES and (seed or lengths != {"side": 4.0, "notch": 1.0, "notch_width": 0.1}):
+        def make() -> Any:
+            return single_edge_notch_mesh(**lengths, **MESHES[name], seed=seed)
+    speed = options.speed
+    return Scene(
+        case="single_edge_notch", title="Single-edge notched plate", parameters={**own, **options.parameters()},
+        sample=load_sample("single_edge_notch", name, make), material=options.material(),
+        sink_law=options.sink_law(), grips=(Grip("top", (0.0, speed)), Grip("bottom", (0.0, -speed))),
+        notch=("notch",), controls=options.controls(), assumed=ASSUMED)
+
+
+if __name__ == "__main__":
+    from ..cli import command
+
+    command(single_edge_notch)

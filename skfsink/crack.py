@@ -1,0 +1,216 @@
+"""Where the crack is: tips, branches, speeds, first arrival at a free edge, separation.
+
+Definitions, the same for every scene and used everywhere:
+
+cracked      nodes with gamma < 0.1.
+origin       the nodes that cracked first in a connected piece of the cracked set; a piece keeps its origins when
+             pieces merge.
+branches     The cracked set is cut into strips of width l by the graph distance from the origins. The pieces of
+             neighbouring strips that touch are linked; pieces with nothing beyond them are ends. Ends nearer than
+             2.5 l to the fork they come from are roughness of the crack's face, not branches. What is left counts.
+tip          the farthest node of an end. It is active while it is younger than 5 l/c_s, arrested after that.
+leading tip  the tip farthest, in a straight line, from the middle of its origin; that distance is the crack length.
+tip speed    slope of the line fitted by least squares to the crack length over the last 4 l/c_s.
+mean speed   crack length gained between its first passing l and the first arrival, over the time that took.
+first arrival  the first cracked node on a free edge, that is neither grip nor notch, farther than 3 l from an origin.
+separation   no path of uncracked nodes joins two grips.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components, dijkstra
+
+from .space import Space
+
+__all__ = ["CRACKED", "CrackTracker", "Tips"]
+
+CRACKED = 0.1
+
+
+@dataclass(frozen=True)
+class Tips:
+    """The crack at one time.
+
+    Attributes
+    ----------
+    position: of the leading tip [mm], (dim,); NaN while nothing is cracked.
+    length: crack length [mm].   speed: of the leading tip [m/s].
+    branches: number of ends.   active: ends that still advance.   points: all tips (branches, dim).
+    """
+
+    position: np.ndarray
+    length: float
+    speed: float
+    branches: int
+    active: int
+    points: np.ndarray
+
+
+class CrackTracker:
+    """Follows the crack through the nodal density, one call a record.
+
+    Parameters
+    ----------
+    space: the spaces.
+    length_scale: l [mm].   shear_wave_speed: c_s [m/s].
+    grips: node numbers of each grip.
+    free_edge: node numbers of the boundary that is neither grip nor notch.
+    """
+
+    def __init__(self, space: Space, length_scale: float, shear_wave_speed: float, grips: list[np.ndarray],
+                 free_edge: np.ndarray) -> None:
+        self.space, self.l = space, length_scale
+        self._transit = length_scale / (shear_wave_speed * 1e3)   # l/c_s [s]
+        self._grips, self._free_edge = grips, free_edge
+        rows = np.repeat(np.arange(space.n_nodes), np.diff(space.graph.indptr))
+        lengths = np.linalg.norm(space.X[rows] - space.X[space.graph.indices], axis=1)
+        self._graph = csr_array((np.maximum(lengths, 1e-12), space.graph.indices, space.graph.indptr),
+                                shape=space.graph.shape)
+        self.cracked_at = np.full(space.n_nodes, np.inf)   #: time at which each node cracked [s]
+        self.origin = np.full(space.n_nodes, -1)           #: number of the origin a node belongs to, -1 for none
+        self.track: list[tuple[float, float]] = []         #: (time, crack length) of the records
+        self.arrival: float | None = None                  #: time of the first arrival [s]
+        self.arrival_length = np.nan
+        self.max_branches = 0
+        self.separated = False
+
+    # --- every density update ---
+    def mark(self, time: float, gamma: np.ndarray) -> bool:
+        """Note nodes that cracked since the last call; True if one of them is the first arrival at a free edge."""
+        new = (gamma < CRACKED) & np.isinf(self.cracked_at)
+        if not new.any():
+            return False
+        self.cracked_at[new] = time
+        if self.arrival is None and new[self._free_edge].any():
+            origins = self.space.X[self.origin >= 0]
+            reached = self.space.X[self._free_edge[new[self._free_edge]]]
+            if len(origins) and (np.linalg.norm(reached[:, None] - origins[None], axis=2).min(axis=1)
+                                 > 3 * self.l).any():
+                self.arrival = time
+                return True
+        return False
+
+    # --- every record ---
+    def look(self, time: float, gamma: np.ndarray) -> Tips:
+        """The crack now. Call :meth:`mark` first."""
+        nodes = np.flatnonzero(np.isfinite(self.cracked_at))
+        dim = self.space.dim
+        if nodes.size == 0:
+            self.track.append((time, 0.0))
+            return Tips(np.full(dim, np.nan), 0.0, 0.0, 0, 0, np.empty((0, dim)))
+        graph = self._graph[nodes][:, nodes]
+        self._find_origins(nodes, graph)
+        owner = self.origin[nodes]
+        sources = np.flatnonzero(owner >= 0)
+        distance, _, nearest = dijkstra(graph, directed=False, indices=sources, min_only=True,
+                                        return_predecessors=True)
+        ends = self._ends(graph, distance)
+        X = self.space.X[nodes]
+        root = owner[np.where(nearest >= 0, nearest, 0)]
+        middles = {k: X[owner == k].mean(axis=0) for k in np.unique(owner[sources])}
+        tips = np.array([X[e] for e in ends])
+        lengths = np.array([np.linalg.norm(X[e] - middles[root[e]]) for e in ends])
+        lead = int(np.argmax(lengths))
+        age = time - self.cracked_at[nodes[ends]]
+        self.track.append((time, float(lengths[lead])))
+        self.max_branches = max(self.max_branches, len(ends))
+        if self.arrival is not None and np.isnan(self.arrival_length):
+            self.arrival_length = float(lengths[lead])
+        self.separated = self.separated or self._apart(gamma)
+        return Tips(tips[lead], float(lengths[lead]), self._speed(), len(ends),
+                    int((age < 5 * self._transit).sum()), tips)
+
+    def mean_speed(self) -> float | None:
+        """Mean speed of the leading tip up to the first arrival, or to the last record before any [m/s]."""
+        track = np.array(self.track)
+        started = track[:, 1] > self.l if len(track) else np.zeros(0, bool)
+        if not started.any():
+            return None
+        first = track[np.argmax(started)]
+        if self.arrival is not None and np.isfinite(self.arrival_length):
+            last = np.array([self.arrival, self.arrival_length])
+        else:
+            last = track[-1]
+        if last[0] <= first[0]:
+            return None
+        return float((last[1] - first[1]) / (last[0] - first[0])) * 1e-3
+
+    def _speed(self) -> float:
+        window = [(t, x) for t, x in self.track if t >= self.track[-1][0] - 4 * self._transit]
+        if len(window) < 3 or window[-1][0] <= window[0][0]:
+            return 0.0
+        t, x = np.array(window).T
+        return float(np.polyfit(t - t[0], x, 1)[0]) * 1e-3
+
+    def _find_origins(self, nodes: np.ndarray, graph: csr_array) -> None:
+        count, label = connected_components(graph, directed=False)
+        for k in range(count):
+            piece = nodes[label == k]
+            if (self.origin[piece] >= 0).any():
+                continue
+            times = self.cracked_at[piece]
+            self.origin[piece[times == times.min()]] = self.origin.max() + 1
+
+    def _ends(self, graph: csr_array, distance: np.ndarray) -> np.ndarray:
+        """Farthest nodes of the ends of the cracked set, without roughness; ascending distance from the origins."""
+        strip = np.floor(distance / self.l).astype(int)
+        rows = np.repeat(np.arange(graph.shape[0]), np.diff(graph.indptr))
+        cols = graph.indices
+        inside = strip[rows] == strip[cols]
+        same = csr_array((np.ones(int(inside.sum())), (rows[inside], cols[inside])), shape=graph.shape)
+        count, piece = connected_components(same, directed=False)
+        level = np.zeros(count, int)
+        level[piece] = strip
+        up = strip[cols] > strip[rows]
+        links = {(int(a), int(b)) for a, b in zip(piece[rows[up]], piece[cols[up]])}
+        above: list[list[int]] = [[] for _ in range(count)]
+        below: list[list[int]] = [[] for _ in range(count)]
+        for a, b in links:
+            above[a].append(b)
+            below[b].append(a)
+        reach = np.zeros(count, int)   # highest strip that can be reached going up
+        for k in sorted(range(count), key=lambda k: -level[k]):
+            reach[k] = max([level[k]] + [reach[b] for b in above[k]])
+        ends = [k for k in range(count) if not above[k]]
+        kept = []
+        for k in sorted(ends, key=lambda k: -level[k]):
+            fork, rival = k, False
+            while below[fork]:
+                fork = min(below[fork])
+                if any(reach[b] > reach[k] or (reach[b] == reach[k] and b != k and b in kept) for b in above[fork]
+                       ) or len(above[fork]) > 1:
+                    rival = True
+                    break
+            if not rival or level[k] - level[fork] >= 2.5:
+                kept.append(k)
+        if not kept:
+            kept = [max(ends, key=lambda k: level[k])]
+        return np.array([np.flatnonzero(piece == k)[np.argmax(distance[piece == k])] for k in sorted(kept)])
+
+    def _apart(self, gamma: np.ndarray) -> bool:
+        whole = np.flatnonzero(gamma >= CRACKED)
+        _, label = connected_components(self._graph[whole][:, whole], directed=False)
+        labels = np.full(self.space.n_nodes, -1)
+        labels[whole] = label
+        held = [set(labels[g].tolist()) - {-1} for g in self._grips]
+        return any(not (a & b) for i, a in enumerate(held) for b in held[i + 1:])
+
+    # --- checkpoints ---
+    def memory(self) -> dict[str, Any]:
+        """Everything the tracker remembers, as arrays."""
+        nan = np.nan if self.arrival is None else self.arrival
+        return {"cracked_at": self.cracked_at, "origin": self.origin, "track": np.array(self.track).reshape(-1, 2),
+                "scalars": np.array([nan, self.arrival_length, self.max_branches, self.separated], float)}
+
+    def restore(self, memory: dict[str, np.ndarray]) -> None:
+        """Take up what :meth:`memory` gave."""
+        self.cracked_at, self.origin = memory["cracked_at"].copy(), memory["origin"].copy()
+        self.track = [(float(t), float(x)) for t, x in memory["track"]]
+        arrival, self.arrival_length, branches, separated = map(float, memory["scalars"])
+        self.arrival = None if np.isnan(arrival) else arrival
+        self.max_branches, self.separated = int(branches), bool(separated)

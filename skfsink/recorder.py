@@ -1,0 +1,156 @@
+"""What a run leaves behind as it goes: rows of the history, frames of the series, and the key moments."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .crack import CrackTracker, Tips
+from .density import DensitySolver
+from .errors import InstabilityError
+from .momentum import Momentum
+from .output import History, Series
+from .scene import Scene
+from .state import State
+
+__all__ = ["Recorder"]
+
+
+class Recorder:
+    """Writes the history and the series of one run, follows the crack, and guards the energy balance.
+
+    Attributes
+    ----------
+    tracker: the crack.   tips: the crack at the last record.
+    moments: frame number of each key moment: onset, branching, arrival, end.
+    onset, at_arrival: figures noted at those moments.
+    """
+
+    def __init__(self, scene: Scene, folder: Path, momentum: Momentum, density: DensitySolver) -> None:
+        self.scene, self.momentum, self.density = scene, momentum, density
+        sample, space = scene.sample, scene.sample.space
+        held = [sample.nodes(grip.boundary) for grip in scene.grips]
+        named = [grip.boundary for grip in scene.grips] + list(scene.notch)
+        self.tracker = CrackTracker(space, scene.sink_law.length_scale, scene.material.shear_wave_speed, held,
+                                    sample.free_edge(*named))
+        self.history = History(folder / "history.csv")
+        self.series = Series(folder / "series", "run", space)
+        self.tips: Tips = self.tracker.look(0.0, np.ones(space.n_nodes))
+        self.tracker.track.clear()
+        self.moments: dict[str, int] = {}
+        self.frames: list[tuple[float, str]] = []
+        self.onset: dict[str, float] = {}
+        self.at_arrival: dict[str, float] = {}
+        self._load_nodes = held[0]
+        first = np.array([v or 0.0 for v in scene.grips[0].velocity])
+        self._load_direction = first / (np.linalg.norm(first) or 1.0)
+        controls = scene.controls
+        quasistatic = controls.analysis == "quasistatic"
+        self._record_every = 5.0 if quasistatic else controls.record_every
+        self._frame_every = 25.0 if quasistatic else controls.frame_every
+
+    # --- loading ---
+    def loading(self, state: State, reaction: np.ndarray) -> None:
+        """Row of a load increment."""
+        self.history.append(self._row(state, reaction, self.tips, 0.0))
+
+    def reached_onset(self, state: State, reaction: np.ndarray) -> None:
+        """Note the onset."""
+        self.onset = {"displacement_mm": state.grip * self.scene.speed, "reaction_N_per_mm": self.load(reaction),
+                      "elastic_energy": state.ledger.elastic, "gamma_min": float(state.gamma.min()),
+                      "sink": state.ledger.sink, "work": state.ledger.work,
+                      "loading_balance": state.ledger.balance}
+
+    def load(self, reaction: np.ndarray) -> float:
+        """Force on the first grip along its velocity [N; N/mm in 2D]."""
+        return float((reaction[self._load_nodes] @ self._load_direction).sum())
+
+    # --- the event ---
+    def start(self, state: State, reaction: np.ndarray) -> None:
+        """First row and frame of the event."""
+        self.tracker.mark(state.time, state.gamma)
+        self._record(state, reaction, 0.0)
+        self.frame(state, "onset")
+
+    def watch(self, state: State, reaction: np.ndarray, before: float, dt: float) -> bool:
+        """To be called after each step from time `before`; True when a row was written."""
+        arrived = self.tracker.mark(state.time, state.gamma)
+        due = int(state.time / self._record_every) != int(before / self._record_every)
+        if not (due or arrived):
+            return False
+        branches = self.tracker.max_branches
+        self._record(state, reaction, dt)
+        if arrived:
+            ledger = state.ledger
+            self.at_arrival = {"U_paper": ledger.paper, "D_sink": ledger.sink, "elastic": ledger.elastic,
+                               "kinetic": ledger.kinetic, "time": state.time}
+            self.frame(state, "arrival")
+        elif branches < 2 <= self.tracker.max_branches:
+            self.frame(state, "branching")
+        elif int(state.time / self._frame_every) != int(before / self._frame_every):
+            self.frame(state, "")
+        return True
+
+    def finish(self, state: State, reaction: np.ndarray, dt: float) -> None:
+        """Last row and frame."""
+        self._record(state, reaction, dt)
+        self.frame(state, "end")
+
+    def frame(self, state: State, label: str) -> None:
+        """Add the state to the ParaView series."""
+        momentum, space = self.momentum, self.scene.sample.space
+        if label:
+            self.moments[label] = len(self.frames)
+        self.frames.append((state.time, label))
+        self.series.add(
+            state.time,
+            {"displacement": state.u, "velocity": state.v, "gamma": state.gamma},
+            {"deleted": state.deleted.astype(np.int8), "W": space.element_mean(np.minimum(momentum.W, 1e3)),
+             "gamma_element": space.element_mean(momentum.gamma)})
+
+    def _record(self, state: State, reaction: np.ndarray, dt: float) -> None:
+        self.tips = self.tracker.look(state.time, state.gamma)
+        self.history.append(self._row(state, reaction, self.tips, dt))
+        self._guard(state)
+
+    def _guard(self, state: State) -> None:
+        scale = self.onset["elastic_energy"]
+        allowed = self.scene.controls.balance_tolerance
+        ledger = state.ledger
+        worst, name = max((ledger.error(scale), "energy balance error"),
+                          (-ledger.numerical / scale, "energy fed in by the integrator"))
+        if not worst <= allowed:
+            raise InstabilityError(f"{name} {worst:.2%} of the onset energy at t = {state.time:.4g} s, allowed "
+                                   f"{allowed:.2%}: lower courant or hht-dt, or raise balance-tolerance")
+
+    def _row(self, state: State, reaction: np.ndarray, tips: Tips, dt: float) -> dict[str, Any]:
+        ledger = state.ledger
+        x = np.full(3, np.nan)
+        x[:tips.position.size] = tips.position
+        quasistatic = state.phase == "event" and self.scene.controls.analysis == "quasistatic"
+        return {
+            "phase": state.phase, "step": state.step, "time_s": state.time,
+            "grip_displacement_mm": state.grip * self.scene.speed, "reaction_N_per_mm": self.load(reaction),
+            "elastic": ledger.elastic, "kinetic": ledger.kinetic, "work": ledger.work,
+            "sink_stored": ledger.sink_stored, "sink_kinetic": ledger.sink_kinetic, "deletion": ledger.deletion,
+            "numerical": ledger.numerical, "released": ledger.released, "U_paper": ledger.paper,
+            "balance": ledger.balance, "tip_x_mm": float(x[0]), "tip_y_mm": float(x[1]), "tip_z_mm": float(x[2]),
+            "crack_length_mm": tips.length, "tip_speed_m_per_s": 0.0 if quasistatic else tips.speed,
+            "tips": tips.active, "branches": tips.branches, "deleted_elements": int(state.deleted.sum()),
+            "gamma_min": float(state.gamma.min()), "dt_s": dt}
+
+    # --- checkpoints ---
+    def memory(self) -> dict[str, Any]:
+        """What goes into a checkpoint as JSON; the tracker's arrays go beside it."""
+        return {"rows": self.history.rows, "frames": self.frames, "moments": self.moments, "onset": self.onset,
+                "at_arrival": self.at_arrival}
+
+    def restore(self, extra: dict[str, Any], tracker: dict[str, np.ndarray]) -> None:
+        """Take up what :meth:`memory` and the tracker's memory gave."""
+        self.history.restore(extra["rows"])
+        self.frames = [(float(t), str(label)) for t, label in extra["frames"]]
+        self.series.resume(len(self.frames))
+        self.moments, self.onset, self.at_arrival = extra["moments"], extra["onset"], extra["at_arrival"]
+        self.tracker.restore(tracker)

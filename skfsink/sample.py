@@ -1,0 +1,136 @@
+"""A meshed sample with named boundaries, from a committed mesh, a mesh file, or gmsh."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import meshio
+import numpy as np
+import skfem
+from skfem.io.meshio import HEX_MAPPING
+
+from .errors import MeshError
+from .meshing import read_mesh
+from .space import Space
+
+__all__ = ["Sample", "data_folder", "load_sample"]
+
+_CELLS = {"quad": (skfem.MeshQuad, "line"), "hexahedron": (skfem.MeshHex, "quad")}
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """A mesh ready to compute on.
+
+    Attributes
+    ----------
+    name: of the mesh.
+    space: spaces on it.
+    boundaries: nodes of each named boundary, ascending.
+    """
+
+    name: str
+    space: Space
+    boundaries: Mapping[str, np.ndarray]
+
+    def nodes(self, boundary: str) -> np.ndarray:
+        """Nodes of a named boundary.
+
+        Raises
+        ------
+        MeshError
+            The mesh has no such boundary.
+        """
+        if boundary not in self.boundaries:
+            raise MeshError(f"mesh {self.name} has no boundary {boundary!r}; it has "
+                            f"{', '.join(sorted(self.boundaries)) or 'none'}")
+        return self.boundaries[boundary]
+
+    def free_edge(self, *others: str) -> np.ndarray:
+        """Nodes of the outer boundary that belong to none of the boundaries `others`."""
+        mesh = self.space.mesh
+        outer = np.zeros(self.space.n_nodes, bool)
+        outer[np.unique(mesh.facets[:, mesh.boundary_facets()])] = True
+        for name in others:
+            if name in self.boundaries:
+                outer[self.boundaries[name]] = False
+        return np.flatnonzero(outer)
+
+
+def data_folder(case: str) -> Path:
+    """Folder with the committed data of a case: `cases/<case>` of a checkout, or its copy in the installed package."""
+    package = Path(__file__).resolve().parent
+    for root in (package / "data" / "cases", package.parent / "cases"):
+        if (root / case).is_dir():
+            return root / case
+    raise MeshError(f"the data of case {case} are not installed")
+
+
+def load_sample(case: str, mesh: str, make: Callable[[], meshio.Mesh] | None = None) -> Sample:
+    """The sample of `case` on the mesh of that name, or in the mesh file of that path.
+
+    `make` builds the mesh when the committed ones do not apply, because a dimension was changed; it needs gmsh.
+
+    Raises
+    ------
+    MeshError
+        Unknown name, missing or unreadable file, or elements that cannot be used.
+    MissingExtra
+        `make` was given and gmsh is not installed.
+    """
+    if make is not None:
+        return _from_meshio(mesh, make())
+    folder = data_folder(case) / "meshes"
+    known = sorted(p.stem for p in folder.glob("*.vtu"))
+    path = folder / f"{mesh}.vtu"
+    if mesh not in known:
+        path = Path(mesh)
+        if not path.suffix:
+            raise MeshError(f"mesh must be one of {', '.join(known)}, or the path of a mesh file; got {mesh!r}")
+        if not path.is_file():
+            raise MeshError(f"there is no mesh file {mesh}")
+    try:
+        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+            data = read_mesh(path)
+    except (Exception, SystemExit) as error:
+        first = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise MeshError(f"the mesh file {path} cannot be read: {first}") from None
+    return _from_meshio(mesh, data)
+
+
+def _from_meshio(name: str, data: meshio.Mesh) -> Sample:
+    present = [kind for kind in _CELLS if kind in data.cells_dict]
+    others = sorted({b.type for b in data.cells} - {"quad", "hexahedron", "line", "vertex"})
+    if not present or others:
+        raise MeshError(f"mesh {name} must consist of quadrilaterals or hexahedra; it has "
+                        f"{', '.join(sorted({b.type for b in data.cells})) or 'no cells'}")
+    kind = "hexahedron" if "hexahedron" in present else "quad"
+    mesh_class, facet = _CELLS[kind]
+    cells = data.cells_dict[kind]
+    if cells.size and (cells.min() < 0 or cells.max() >= len(data.points)):
+        raise MeshError(f"mesh {name} has elements with nodes that do not exist")
+    dim = 2 if kind == "quad" else 3
+    points = np.asarray(data.points, float)[:, :dim]
+    if kind == "quad":
+        connectivity = cells.T
+    else:
+        connectivity = cells[:, HEX_MAPPING[:8]].T
+    space = Space(mesh_class(np.ascontiguousarray(points.T), np.ascontiguousarray(connectivity.astype(np.int64))))
+    return Sample(name, space, _boundaries(data, facet))
+
+
+def _boundaries(data: meshio.Mesh, facet: str) -> dict[str, np.ndarray]:
+    sets: dict[str, Any] = {}
+    for name, members in data.cell_sets.items():
+        if name.startswith("gmsh:"):
+            continue
+        nodes = [block.data[index].ravel() for block, index in zip(data.cells, members)
+                 if block.type == facet and index is not None and len(index)]
+        if nodes:
+            sets[name] = np.unique(np.concatenate(nodes))
+    return sets

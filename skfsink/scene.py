@@ -1,0 +1,172 @@
+"""A scene: everything that defines a run, and its file `scene.toml`."""
+
+from __future__ import annotations
+
+import hashlib
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomli_w
+
+from .density import SINKS
+from .errors import OutputError, ParameterError, require
+from .explicit import ExplicitControls
+from .hht import HHTControls
+from .material import Material, SinkLaw
+from .momentum import ELEMENTS
+from .sample import Sample
+from .statics import StaticsControls
+
+__all__ = ["ANALYSES", "INTEGRATORS", "Controls", "Grip", "Scene", "read_parameters"]
+
+ANALYSES = ("dynamic", "quasistatic", "both")
+INTEGRATORS = ("explicit", "hht")
+
+
+def choose(name: str, value: str, allowed: tuple[str, ...]) -> str:
+    """Return `value` if it is one of the words allowed for `name`."""
+    if value not in allowed:
+        raise ParameterError(f"{name} must be one of {', '.join(allowed)}; got {value!r}")
+    return value
+
+
+@dataclass(frozen=True)
+class Grip:
+    """A boundary that moves as given: velocity [mm/s] by component, None where it is free."""
+
+    boundary: str
+    velocity: tuple[float | None, ...]
+
+
+@dataclass(frozen=True)
+class Controls:
+    """How a scene is computed.
+
+    Parameters
+    ----------
+    analysis: "dynamic" or "quasistatic" ("both" is two runs).
+    integrator: "explicit" or "hht", for the dynamic event.
+    sink: "lumped", "consistent" or "nearest".
+    element: "jbar" or "plain".
+    overshoot: how far past the onset the state is scaled before the event, relative to the onset displacement, (0, 0.1].
+    deletion: gamma at which an element fails, (0, 1e-2].
+    force_floor: gamma below which a Gauss point exerts no force, [0, 0.1].
+    event_time: longest dynamic event [s], > 0; it ends earlier when the sample has come apart.
+    record_every: time between rows of the history [s], > 0.
+    frame_every: time between frames of the ParaView series [s], > 0.
+    balance_tolerance: balance error, relative to the onset energy, at which a run is stopped, (0, 1].
+    checkpoint_every: wall time between checkpoints [s], > 0.
+    threads: of the factorisations, >= 1; runs are reproducible to the last bit with 1.
+    """
+
+    analysis: str = "dynamic"
+    integrator: str = "explicit"
+    sink: str = "lumped"
+    element: str = "jbar"
+    overshoot: float = 0.005
+    deletion: float = 1e-6
+    force_floor: float = 1e-3
+    event_time: float = 2e-4
+    record_every: float = 1e-6
+    frame_every: float = 5e-6
+    balance_tolerance: float = 0.05
+    checkpoint_every: float = 20.0
+    threads: int = 1
+    explicit: ExplicitControls = field(default_factory=ExplicitControls)
+    hht: HHTControls = field(default_factory=HHTControls)
+    statics: StaticsControls = field(default_factory=StaticsControls)
+
+    def __post_init__(self) -> None:
+        choose("analysis", self.analysis, ANALYSES)
+        choose("integrator", self.integrator, INTEGRATORS)
+        choose("sink", self.sink, SINKS)
+        choose("element", self.element, ELEMENTS)
+        require("overshoot", self.overshoot, low=0, high=0.1, low_open=True)
+        require("deletion", self.deletion, low=0, high=1e-2, low_open=True)
+        require("force-floor", self.force_floor, low=0, high=0.1)
+        for name in ("event_time", "record_every", "frame_every", "checkpoint_every"):
+            require(name.replace("_", "-"), getattr(self, name), "s", low=0, low_open=True)
+        require("balance-tolerance", self.balance_tolerance, low=0, high=1, low_open=True)
+        require("threads", self.threads, low=1, high=256)
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A sample of a material, held by grips, and how to compute it.
+
+    Parameters
+    ----------
+    case: name of the case module.
+    title: for pictures.
+    parameters: the arguments of the case function, enough to make this scene again.
+    sample, material, sink_law: what is computed.
+    grips: the first one's reaction is the load that is reported, in the direction of its velocity.
+    notch: boundaries that are no free edges although nothing holds them.
+    controls: how it is computed.
+    assumed: statements about lengths that the paper does not print.
+    """
+
+    case: str
+    title: str
+    parameters: Mapping[str, Any]
+    sample: Sample
+    material: Material
+    sink_law: SinkLaw
+    grips: tuple[Grip, ...]
+    notch: tuple[str, ...] = ()
+    controls: Controls = field(default_factory=Controls)
+    assumed: tuple[str, ...] = ()
+
+    def constraints(self) -> tuple[np.ndarray, np.ndarray]:
+        """Mask of the free degrees of freedom (n*dim,) and velocity of the held ones (n, dim) [mm/s]."""
+        X = self.sample.space.X
+        free, velocity = np.ones(X.shape, bool), np.zeros(X.shape)
+        for grip in self.grips:
+            nodes = self.sample.nodes(grip.boundary)
+            for i, value in enumerate(grip.velocity):
+                if value is not None:
+                    free[nodes, i] = False
+                    velocity[nodes, i] = value
+        return free.ravel(), velocity
+
+    @property
+    def speed(self) -> float:
+        """Speed at which the grips part [mm/s]."""
+        velocity = np.array([[v or 0.0 for v in grip.velocity] for grip in self.grips])
+        return float(np.linalg.norm(velocity[0] - velocity[-1]))
+
+    def toml(self) -> str:
+        """Text of `scene.toml`."""
+        head = (f"# A run of skfsink. Run it again with: python -m skfsink.cases.{self.case} "
+                "and the parameters below.\n"
+                "# Plain numbers are in N, mm, MPa and s; density in kg/m^3.\n")
+        parameters = {k: v for k, v in self.parameters.items() if v is not None}
+        return head + tomli_w.dumps({"case": self.case, "parameters": parameters, "assumed": list(self.assumed)})
+
+    @property
+    def fingerprint(self) -> str:
+        """Hash of all that decides the results of the run."""
+        return hashlib.sha256(self.toml().encode()).hexdigest()
+
+
+def read_parameters(folder: Path, case: str) -> dict[str, Any]:
+    """Parameters in the `scene.toml` of a run.
+
+    Raises
+    ------
+    OutputError
+        The folder holds no readable scene, or one of another case.
+    """
+    path = folder / "scene.toml"
+    try:
+        data = tomllib.loads(path.read_text())
+        found, parameters = str(data["case"]), dict(data["parameters"])
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, KeyError, TypeError, ValueError) as error:
+        raise OutputError(f"{path} is not the scene of a run: {error}") from None
+    if found != case:
+        raise OutputError(f"{folder} holds a run of case {found}, not of {case}")
+    return parameters

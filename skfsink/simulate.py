@@ -1,0 +1,236 @@
+"""A run from the intact sample to the broken one: loading to the onset, then the event, dynamic or quasi-static."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from pathlib import Path
+from typing import Any
+
+from .checkpoint import load_checkpoint, save_checkpoint, save_state
+from .density import DensitySolver
+from .energy import Ledger
+from .errors import SkfsinkError
+from .explicit import Explicit
+from .hht import HHT
+from .momentum import Momentum
+from .progress import Display, Interrupt
+from .recorder import Recorder
+from .scene import Scene
+from .state import State
+from .statics import Statics
+
+__all__ = ["Interrupted", "Simulation"]
+
+
+class Interrupted(SkfsinkError):
+    """The run was interrupted and left a checkpoint to resume from."""
+
+
+class Simulation:
+    """One run of a scene in a folder, resumable at any moment.
+
+    Parameters
+    ----------
+    scene: what to run; its analysis is "dynamic" or "quasistatic".
+    folder: where `history.csv`, the series and the checkpoint go; it must exist.
+    display: what the person sees.
+    """
+
+    CHECKPOINT = "checkpoint.npz"
+    ONSET = "onset.npz"
+
+    def __init__(self, scene: Scene, folder: Path, display: Display) -> None:
+        self.scene, self.folder, self.display = scene, folder, display
+        c, space = scene.controls, scene.sample.space
+        self.free, self.grip_velocity = scene.constraints()
+        self.momentum = Momentum(space, scene.material, c.element, c.force_floor)
+        self.density = DensitySolver(space, scene.sink_law, c.sink)
+        self.statics = Statics(self.momentum, self.density, self.free, self.grip_velocity, c.statics, c.deletion,
+                               c.threads)
+        self.recorder = Recorder(scene, folder, self.momentum, self.density)
+        self.state = State.intact(space)
+        self.integrator: Explicit | HHT | None = None
+        self.wall = {"loading": 0.0, "event": 0.0, "output": 0.0}
+        self.counts = {"steps": 0, "gamma_solves": 0, "factorisations": 0}
+        self._saved = self._clock = time.perf_counter()
+
+    # --- the phases ---
+    def run(self, onset: State | None = None) -> State:
+        """Run to the end from where the state is; `onset` is a state already loaded to the onset."""
+        with Interrupt() as interrupt:
+            self._interrupt = interrupt
+            if self.state.phase == "loading":
+                if onset is None:
+                    self._load()
+                else:
+                    self._adopt(onset)
+                self._begin_event()
+            if self.state.phase == "event":
+                self.display.phase(self.scene.controls.analysis)
+                if self.scene.controls.analysis == "quasistatic":
+                    self._propagate()
+                else:
+                    self._integrate()
+                self.state.phase = "done"
+            self._lap("event")
+            self.checkpoint()
+        return self.state
+
+    def _load(self) -> None:
+        self.display.phase("loading")
+        state = self.state
+        tolerance = self.scene.controls.statics.onset_tolerance
+        started = False
+        for state in self.statics.load(state):
+            reaction = self.momentum.force(state.u)
+            self.recorder.loading(state, reaction)
+            started = True
+            done = 0.5 * min(1.0, tolerance * state.grip / self.statics.increment) ** 0.25
+            self.display.update(done, f"grips {state.grip * self.scene.speed:.4f} mm  load "
+                                      f"{self.recorder.load(reaction):.4f} N/mm  least γ {state.gamma.min():.3f}")
+            self._pause("loading")
+        if started or not self.recorder.onset:
+            self.recorder.reached_onset(state, self.momentum.force(state.u))
+        self._lap("loading")
+        save_state(self.folder / self.ONSET, self.scene.fingerprint, state)
+
+    def _adopt(self, onset: State) -> None:
+        self.state = onset
+        self.momentum.set_gamma(onset.gamma, onset.deleted)
+        reaction = self.momentum.force(onset.u)
+        self.recorder.loading(onset, reaction)
+        self.recorder.reached_onset(onset, reaction)
+
+    def _begin_event(self) -> None:
+        """Scale the state just past the onset, and start a new ledger there."""
+        state, factor = self.state, 1.0 + self.scene.controls.overshoot
+        state.u *= factor
+        state.grip *= factor
+        state.time, state.step, state.phase = 0.0, 0, "event"
+        state.ledger = Ledger()
+        self.momentum.set_gamma(state.gamma, state.deleted)
+        reaction = self.momentum.force(state.u)
+        if self.scene.controls.analysis == "quasistatic":
+            state.ledger.initial = state.ledger.elastic = self.momentum.energy
+        else:
+            self._make_integrator()
+            assert self.integrator is not None
+            self.integrator.begin(state)
+        self.recorder.start(state, reaction)
+
+    def _make_integrator(self) -> None:
+        c = self.scene.controls
+        if c.integrator == "explicit":
+            self.integrator = Explicit(self.momentum, self.density, self.free, self.grip_velocity, c.explicit,
+                                       c.deletion)
+        else:
+            self.integrator = HHT(self.momentum, self.density, self.free, self.grip_velocity, c.hht, c.deletion,
+                                  c.threads)
+
+    def _integrate(self) -> None:
+        state, integrator, recorder = self.state, self.integrator, self.recorder
+        assert integrator is not None
+        end = self.scene.controls.event_time
+        before = state.time
+        for _ in integrator.run(state, end):
+            self.counts["steps"] += 1
+            if recorder.watch(state, integrator.reaction, before, integrator.dt):
+                self._show(state, state.time / end, f"{state.time * 1e6:.1f} µs")
+            before = state.time
+            if recorder.tracker.separated:
+                break
+            self._pause("event")
+        integrator.sync(state)
+        recorder.finish(state, integrator.reaction, integrator.dt)
+
+    def _propagate(self) -> None:
+        state, recorder = self.state, self.recorder
+        before = state.time
+        scale = recorder.onset["elastic_energy"]
+        for _ in self.statics.propagate(state):
+            self.counts["steps"] += 1
+            if recorder.watch(state, self.momentum.force(state.u), before, 0.0):
+                self._show(state, 0.0, f"sweep {state.step}")
+            before = state.time
+            if recorder.tracker.separated and state.ledger.elastic < 1e-4 * scale:
+                break
+            self._pause("event")
+        recorder.finish(state, self.momentum.force(state.u), 0.0)
+
+    def _show(self, state: State, fraction: float, clock: str) -> None:
+        tips, ledger = self.recorder.tips, state.ledger
+        size = float((self.scene.sample.space.X.max(axis=0) - self.scene.sample.space.X.min(axis=0)).max())
+        load = self.recorder.history.rows[-1]["reaction_N_per_mm"]
+        self.display.update(max(fraction, 0.9 * tips.length / size), (
+            f"{clock}  tip {tips.position[0]:.2f}, {tips.position[1]:.2f} mm ×{tips.branches}  load {load:.3f}  "
+            f"elastic {ledger.elastic:.4f} kinetic {ledger.kinetic:.4f} D {ledger.sink:.4f} U {ledger.paper:.4f}"))
+
+    # --- clocks and checkpoints ---
+    def _lap(self, phase: str) -> None:
+        now = time.perf_counter()
+        self.wall[phase] += now - self._clock
+        self._clock = now
+
+    def _pause(self, phase: str) -> None:
+        """Between steps: save a checkpoint when one is due, and stop when asked to."""
+        if self._interrupt.received or time.perf_counter() - self._saved > self.scene.controls.checkpoint_every:
+            self._lap(phase)
+            self.checkpoint()
+            self._saved = time.perf_counter()
+            if self._interrupt.received:
+                raise Interrupted(f"interrupted; go on with --resume {self.folder}")
+
+    def _solver_counts(self) -> dict[str, int]:
+        factorisations = self.statics.solver.count + self.density.factorisations
+        if isinstance(self.integrator, HHT):
+            factorisations += self.integrator.solver.count
+        return {"gamma_solves": self.density.solves, "factorisations": factorisations}
+
+    def cost(self) -> dict[str, Any]:
+        """Wall times and counts since the run began, over all its sessions."""
+        live = self._solver_counts()
+        return {"wall": dict(self.wall), "steps": self.counts["steps"],
+                **{k: self.counts[k] + n for k, n in live.items()}}
+
+    def checkpoint(self) -> None:
+        """Write the checkpoint."""
+        memories = {"tracker": self.recorder.tracker.memory(), "statics": self.statics.memory(),
+                    "density": self.density.memory()}
+        if self.integrator is not None:
+            self.integrator.sync(self.state)
+            memories["integrator"] = self.integrator.memory()
+        save_checkpoint(self.folder / self.CHECKPOINT, self.scene.fingerprint, self.state, memories,
+                        {"recorder": self.recorder.memory(), "cost": self.cost()})
+
+    def resume(self) -> None:
+        """Take up the run where its checkpoint left it.
+
+        Raises
+        ------
+        CheckpointError
+            The checkpoint is missing, damaged, or of another scene or version.
+        """
+        state, memories, extra = load_checkpoint(self.folder / self.CHECKPOINT, self.scene.fingerprint)
+        self.state = state
+        self.recorder.restore(extra["recorder"], memories["tracker"])
+        self.statics.restore(memories["statics"])
+        self.density.restore(memories.get("density", {}))
+        cost = extra["cost"]
+        self.wall.update(cost.pop("wall"))
+        self.counts.update(cost)
+        if "integrator" in memories:
+            self._make_integrator()
+            assert self.integrator is not None
+            self.integrator.restore(state, memories["integrator"])
+        else:
+            self.momentum.set_gamma(state.gamma, state.deleted)
+            self.momentum.force(state.u)
+
+
+def onset_copy(state: State) -> State:
+    """An independent copy of a loaded state, to start another analysis from."""
+    return dataclasses.replace(
+        state, u=state.u.copy(), v=state.v.copy(), a=state.a.copy(), gamma=state.gamma.copy(),
+        W_max=state.W_max.copy(), deleted=state.deleted.copy(), deletions=list(state.deletions),
+        ledger=dataclasses.replace(state.ledger))

@@ -1,0 +1,81 @@
+"""Small bodies the tests share: distorted meshes, random fields, boundary masks."""
+
+from __future__ import annotations
+
+import numpy as np
+import skfem
+
+from skfsink.space import Space
+
+
+def distorted(mesh: skfem.Mesh, amount: float, seed: int = 0) -> skfem.Mesh:
+    """`mesh` with its interior nodes moved at random by up to `amount` of the shortest edge along each axis."""
+    p = mesh.p.copy()
+    inside = np.setdiff1d(np.arange(p.shape[1]), mesh.boundary_nodes())
+    edge = np.inf
+    for i in range(mesh.t.shape[0]):
+        for j in range(i):
+            edge = min(edge, np.linalg.norm(p[:, mesh.t[i]] - p[:, mesh.t[j]], axis=0).min())
+    p[:, inside] += np.random.default_rng(seed).uniform(-amount, amount, (p.shape[0], inside.size)) * edge
+    return type(mesh)(p, mesh.t)
+
+
+def grid(kind: str, shape: tuple[int, ...], size: tuple[float, ...] | float = 1.0) -> skfem.Mesh:
+    """Regular mesh of `shape` elements over a box of the given `size` [mm] with a corner at the origin."""
+    sizes = np.broadcast_to(np.asarray(size, float), len(shape))
+    axes = [np.linspace(0.0, length, n + 1) for length, n in zip(sizes, shape, strict=True)]
+    return (skfem.MeshQuad if kind == "quad" else skfem.MeshHex).init_tensor(*axes)
+
+
+def box(kind: str, n: int, amount: float = 0.2, size: float = 1.0, seed: int = 0) -> Space:
+    """Space on a distorted mesh of n elements along each edge of a square or cube."""
+    return Space(distorted(grid(kind, (n,) * (2 if kind == "quad" else 3), size), amount, seed))
+
+
+def notched(n: int, length: float = 1.0, notch: float = 0.4) -> Space:
+    """Square plate of n x n elements without those of one row (n odd: at mid-height) up to x = `notch`."""
+    mesh = grid("quad", (n, n), length)
+    x, y = mesh.p[:, mesh.t].mean(axis=1)
+    slit = (x < notch) & (np.abs(y - length / 2) < 0.51 * length / n)
+    return Space(mesh.remove_elements(np.flatnonzero(slit)))
+
+
+def boundary(space: Space) -> np.ndarray:
+    """Mask (n,) of the nodes on the boundary."""
+    mask = np.zeros(space.n_nodes, bool)
+    mask[space.mesh.boundary_nodes()] = True
+    return mask
+
+
+def ends(space: Space, axis: int = 1) -> tuple[np.ndarray, np.ndarray]:
+    """Masks (n,) of the nodes on the lower and on the upper end of the body along `axis`."""
+    x = space.X[:, axis]
+    return np.isclose(x, x.min()), np.isclose(x, x.max())
+
+
+def grips(space: Space, speed: float, axis: int = 1) -> tuple[np.ndarray, np.ndarray]:
+    """Mask of the free unknowns (n*dim,) and velocities (n, dim) when both ends move apart along `axis` at `speed`."""
+    low, high = ends(space, axis)
+    free = np.repeat(~(low | high), space.dim)
+    velocity = np.zeros_like(space.X)
+    velocity[low, axis], velocity[high, axis] = -speed, speed
+    return free, velocity
+
+
+def wavy(space: Space, size: float, seed: int = 1) -> np.ndarray:
+    """A smooth displacement (n, dim) with gradients of about `size`, without any symmetry."""
+    rng = np.random.default_rng(seed)
+    u = np.zeros_like(space.X)
+    for i in range(space.dim):
+        for _ in range(3):
+            k = rng.uniform(-3, 3, space.dim)
+            u[:, i] += np.sin(space.X @ k + rng.uniform(0, 6)) * size / 3
+    return u
+
+
+def patchy(space: Space, seed: int = 2, dead: float = 0.2) -> np.ndarray:
+    """Gauss point densities (ne, nq), random in (0.01, 1), with a share `dead` of the elements at zero."""
+    rng = np.random.default_rng(seed)
+    gamma = rng.uniform(0.01, 1, space.w.shape)
+    gamma[rng.uniform(size=space.n_elements) < dead] = 0.0
+    return gamma

@@ -1,0 +1,20 @@
+"""Fixtures shared by the tests: one distorted mesh of each kind."""
+
+from __future__ import annotations
+
+import pytest
+from bodies import box
+
+from skfsink.space import Space
+
+
+@pytest.fixture(params=["quad", "hex"])
+def kind(request: pytest.FixtureRequest) -> str:
+    """Kind of element: every test that asks for it runs on quadrilaterals and on hexahedra."""
+    return request.param
+
+
+@pytest.fixture
+def space(kind: str) -> Space:
+    """Distorted mesh of the unit square (25 quads) or cube (64 hexes, a full tile; quads leave one partly filled)."""
+    return box(kind, 5 if kind == "quad" else 4)

@@ -1,0 +1,151 @@
+"""Orders of convergence under refinement, and the element that does not lock."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+import skfem
+from bodies import boundary, box, grid
+from skfem.helpers import dot
+
+from skfsink.density import DensitySolver
+from skfsink.linalg import Factorization
+from skfsink.material import AAA, Material, NeoHookean, SinkLaw
+from skfsink.momentum import Momentum
+from skfsink.space import Pattern, Space
+
+SIZES = {"quad": (8, 16, 32), "hex": (4, 8, 16)}
+
+
+def rates(sizes: tuple[int, ...], errors: list[float]) -> np.ndarray:
+    """Observed orders between successive refinements."""
+    return np.diff(np.log(errors)) / -np.diff(np.log(sizes))
+
+
+def newton(momentum: Momentum, free: np.ndarray, u: np.ndarray, load: np.ndarray) -> np.ndarray:
+    """Displacement under the nodal `load`, with the unknowns outside `free` kept as in `u`."""
+    pattern = Pattern(momentum.space, momentum.space.dim, free, upper=True)
+    solver = Factorization(pattern)
+    u = u.copy()
+    for _ in range(30):
+        r = (momentum.force(u) - load).ravel()[free]
+        if np.linalg.norm(r) <= 1e-8 * np.linalg.norm(momentum.force(u)):
+            solver.release()
+            return u
+        solver.factorize(momentum.tangent(pattern, u))
+        u.reshape(-1)[free] -= solver.solve(r)
+    raise AssertionError("Newton's method did not converge")
+
+
+@dataclass
+class Waves:
+    """u_i = sum_m a_mi sin(k_m . X + s_m): a finite deformation with derivatives in closed form; X is (dim, ...)."""
+
+    a: np.ndarray
+    k: np.ndarray
+    s: np.ndarray
+
+    @classmethod
+    def of(cls, dim: int, size: float) -> Waves:
+        rng = np.random.default_rng(dim)
+        return cls(rng.uniform(-size, size, (3, dim)), rng.uniform(-2.5, 2.5, (3, dim)), rng.uniform(0, 6, 3))
+
+    def u(self, X: np.ndarray) -> np.ndarray:
+        return np.einsum("mi,m...->i...", self.a, np.sin(self._phase(X)))
+
+    def body_force(self, X: np.ndarray, material: Material) -> np.ndarray:
+        """-Div P, i.e. -A_iJkL u_k,LJ, at the points X (dim, ...)."""
+        dim, phase = len(X), self._phase(X)
+        F = np.zeros((*X.shape[1:], 3, 3))
+        F[...] = np.eye(3)
+        F[..., :dim, :dim] += np.einsum("mi,mJ,m...->...iJ", self.a, self.k, np.cos(phase))
+        second = -np.einsum("mk,mL,mJ,m...->...kLJ", self.a, self.k, self.k, np.sin(phase))
+        A = material.modulus(F)[..., :dim, :dim, :dim, :dim]
+        return -np.einsum("...iJkL,...kLJ->i...", A, second)
+
+    def _phase(self, X: np.ndarray) -> np.ndarray:
+        return np.einsum("mi,i...->m...", self.k, X) + self.s.reshape(-1, *(1,) * (X.ndim - 1))
+
+
+def elastic_error(space: Space, material: Material, element: str = "jbar") -> float:
+    """L2 error of the displacement for the wavy solution, held at the boundary and driven by its body force."""
+    exact = Waves.of(space.dim, 0.05)
+    fine = skfem.Basis(space.mesh, space.u_basis.elem, intorder=5)
+    X = np.asarray(fine.global_coordinates())
+    load = skfem.LinearForm(lambda v, w: dot(w["b"], v)).assemble(fine, b=exact.body_force(X, material))
+    nodal = exact.u(space.X.T).T
+    free = np.repeat(~boundary(space), space.dim)
+    u = newton(Momentum(space, material, element), free, nodal, load.reshape(nodal.shape))
+    difference = np.asarray(fine.interpolate(u.ravel())) - exact.u(X)
+    return float(np.sqrt((difference**2 * fine.dx).sum()))
+
+
+@pytest.mark.parametrize("bulk", [500.0, 5.0])
+def test_displacement_converges_with_order_two(kind: str, bulk: float):
+    """Fails if force, J_bar or geometry are inconsistent: finite strain on distorted meshes, nearly incompressible or not."""
+    errors = [elastic_error(box(kind, n, 0.15), AAA(bulk_modulus=bulk)) for n in SIZES[kind]]
+    order = rates(SIZES[kind], errors)
+    print(kind, bulk, errors, order)
+    assert ((order > 1.85) & (order < 2.2)).all(), (errors, order)
+
+
+def density_error(space: Space, sink: str) -> float:
+    """L2 error of gamma = 0.6 + 0.2 prod cos(pi X_i): the history that makes it the exact solution is prescribed.
+
+    The equation l^2 div grad gamma + 1 - gamma/(H + eps) = 0 with no flux through the boundary is solved by that gamma
+    if H + eps = gamma/(1 + l^2 div grad gamma), which lies in (0, 1); H is given through W = Phi (-ln H)^(1/m).
+    """
+    law = SinkLaw(length_scale=0.15)
+
+    def bump(X: np.ndarray) -> np.ndarray:
+        return 0.2 * np.cos(np.pi * X).prod(axis=0)
+
+    points = np.einsum("qa,eai->ieq", space.N, space.X[space.conn])
+    H = (0.6 + bump(points)) / (1 - law.length_scale**2 * space.dim * np.pi**2 * bump(points)) - law.epsilon
+    assert 0 < H.min() < H.max() < 1
+    W = law.phi * (-np.log(H)) ** (1 / law.m)
+    np.testing.assert_allclose(law.history(W), H, rtol=1e-12)
+    solver = DensitySolver(space, law, sink, tolerance=1e-11)
+    gamma = solver.solve(W, np.ones(space.n_nodes))
+    fine = skfem.Basis(space.mesh, space.gamma_basis.elem, intorder=5)
+    difference = np.asarray(fine.interpolate(gamma)) - 0.6 - bump(np.asarray(fine.global_coordinates()))
+    return float(np.sqrt((difference**2 * fine.dx).sum()))
+
+
+@pytest.mark.parametrize("sink", ["lumped", "consistent", "nearest"])
+def test_density_converges_with_order_two(kind: str, sink: str):
+    """Fails if the flux, the sink, its lumping or the load is wrong by any factor."""
+    errors = [density_error(box(kind, n, 0.15), sink) for n in SIZES[kind]]
+    order = rates(SIZES[kind], errors)
+    print(kind, sink, errors, order)
+    assert ((order > 1.85) & (order < 2.2)).all(), (errors, order)
+
+
+def cook(n: int, element: str, material: Material, traction: float) -> float:
+    """Vertical displacement [mm] of the upper right corner of Cook's membrane, clamped left, sheared at the right end."""
+    mesh = grid("quad", (n, n))
+    x, y = mesh.p
+    space = Space(skfem.MeshQuad(np.array([48 * x, 44 * x + (44 - 28 * x) * y]), mesh.t))
+    right = np.flatnonzero(np.isclose(space.X[:, 0], 48))
+    right = right[np.argsort(space.X[right, 1])]
+    load = np.zeros_like(space.X)
+    edges = np.diff(space.X[right, 1]) * traction / 2
+    load[right[:-1], 1] += edges
+    load[right[1:], 1] += edges
+    free = np.repeat(space.X[:, 0] > 1e-9, 2)
+    u = newton(Momentum(space, material, element), free, np.zeros_like(load), load)
+    return float(u[right[-1], 1])
+
+
+def test_mean_jacobian_does_not_lock_and_the_plain_element_does():
+    """Fails if J_bar is not really in the force, or the plain element is not plain: Cook's membrane at k/mu = 405."""
+    material = NeoHookean()
+    assert material.bulk_modulus / material.shear_modulus == pytest.approx(405, abs=0.5)
+    traction = 0.02
+    reference = cook(64, "jbar", material, traction)
+    for n in (8, 16):
+        mean, plain = cook(n, "jbar", material, traction), cook(n, "plain", material, traction)
+        print(n, mean / reference, plain / reference)
+    assert abs(reference) > 1.0
