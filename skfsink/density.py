@@ -50,7 +50,7 @@ class DensitySolver:
         self.space, self.law, self.sink = space, law, sink
         self.unchanged = unchanged
         self.pattern = Pattern(space)
-        self.load = space.lump(np.ones_like(space.w))
+        self.load = self._lump(np.ones_like(space.w))
         self._laplacian = kernels.laplacian(space, self.pattern, law.length_scale**2)
         self._direct: Factorization | None = None
         self._amg = AmgCG(self.pattern.matrix(self._assemble(np.ones_like(space.w))), tolerance)
@@ -107,12 +107,14 @@ class DensitySolver:
         if self.sink == "consistent":
             return self._laplacian + kernels.weighted_mass(self.space, self.pattern, sink)
         data = self._laplacian.copy()
-        if self.sink == "lumped":
-            diagonal = self.space.lump(sink)
-        else:
-            diagonal = np.bincount(self.space.conn.ravel(), (self.space.w * sink).ravel(), self.space.n_nodes)
-        data[self.pattern.diagonal] += diagonal
+        data[self.pattern.diagonal] += self._lump(sink)
         return data
+
+    def _lump(self, values: np.ndarray) -> np.ndarray:
+        """Nodal sums (n,) of Gauss point values; of sink and load alike, so that H = 1 gives gamma = 1."""
+        if self.sink == "nearest":
+            return np.bincount(self.space.conn.ravel(), (self.space.w * values).ravel(), self.space.n_nodes)
+        return self.space.lump(values)
 
     def _factorise(self, data: np.ndarray) -> np.ndarray:
         """Direct solve, on the matrix scaled to a unit diagonal: its entries span fifteen decades."""

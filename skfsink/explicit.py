@@ -48,7 +48,7 @@ class ExplicitControls:
     estimate_change: relative change of the cheap indicator that calls for a new estimate, in (0, 1).
     """
 
-    courant: float = 0.9
+    courant: float = 0.8
     gamma_every: int = 5
     mass_floor: float = 1e-3
     estimate_every: int = 400
@@ -97,7 +97,8 @@ class Explicit:
     dt: the current step [s].   estimates: frequency estimates made.   reaction: (n, dim) internal force.
     """
 
-    CHECK = 10  # steps between looks at the cheap indicator
+    CHECK = 5        # steps between looks at the cheap indicator
+    FED_IN = 1e-6    # energy a step may feed in before omega_max is estimated at once, of the initial energy
 
     def __init__(self, momentum: Momentum, density: DensitySolver, free: np.ndarray, grip_velocity: np.ndarray,
                  controls: ExplicitControls | None = None, deletion: float = 1e-6) -> None:
@@ -114,6 +115,7 @@ class Explicit:
         self._mode: np.ndarray | None = None
         self._indicator0 = 0.0
         self._last_estimate = 0
+        self._urgent = False
 
     def start(self, state: State) -> None:
         """Forces, masses and accelerations of `state`; to be called once before stepping, and after a resume."""
@@ -146,7 +148,7 @@ class Explicit:
 
     def step(self, state: State) -> None:
         """One time step, with the solve for gamma when it is due."""
-        if self._mode is None or state.step % self.CHECK == 0:
+        if self._mode is None or self._urgent or state.step % self.CHECK == 0:
             self._set_step(state)
         dt = self.dt
         old = self.reaction
@@ -157,7 +159,10 @@ class Explicit:
         self.reaction, self._spare = force, old
         ledger = state.ledger
         elastic = self.momentum.energy
-        ledger.numerical += trapezoid - (elastic - self._elastic) - dt * dt / 8 * swing
+        fed = dt * dt / 8 * swing + (elastic - self._elastic) - trapezoid
+        ledger.numerical -= fed
+        if fed > self.FED_IN * ledger.initial:  # first sign of a step that has become too long
+            self._urgent = True
         ledger.work += held
         ledger.elastic = self._elastic = elastic
         ledger.kinetic = kinetic
@@ -178,7 +183,7 @@ class Explicit:
         state.gamma = self.density.solve(state.W_max, state.gamma)
         if self.density.solves == solves:
             return
-        failed = delete_failed(self.space, state, self.deletion, self.density.law.failure_energy)
+        delete_failed(self.space, state, self.deletion, self.density.law.failure_energy)
         before, mass = momentum.gamma, self.mass
         momentum.set_gamma(state.gamma, state.deleted)
         self.mass = momentum.lumped_mass(self.controls.mass_floor)
@@ -202,11 +207,12 @@ class Explicit:
         indicator = self._indicator(state.u)
         ratio = indicator / self._indicator0 if self._indicator0 > 0 else np.inf
         due = state.step - self._last_estimate >= c.estimate_every
-        if self._mode is None or due or abs(ratio - 1) > 2 * c.estimate_change:
+        if self._mode is None or self._urgent or due or abs(ratio - 1) > 2 * c.estimate_change:
             self._omega, self._mode = highest_frequency(self.momentum, self._pattern, self.free, state.u, self.mass,
                                                         self._mode)
             self._indicator0, self._last_estimate, ratio = indicator, state.step, 1.0
             self.estimates += 1
+            self._urgent = False
         self.dt = c.courant * 2.0 / (self._omega * np.sqrt(max(1.0, ratio)))
 
     def _indicator(self, u: np.ndarray) -> float:
@@ -220,15 +226,15 @@ class Explicit:
         """What the integrator remembers beyond the state, for a checkpoint."""
         assert self._mode is not None
         return {"mode": self._mode, "scalars": np.array([self.dt, self._omega, self._indicator0,
-                                                         self._last_estimate, self.estimates, self._elastic]),
+                                                         self._last_estimate, self.estimates, self._elastic, self._urgent]),
                 "reaction": self.reaction}
 
     def restore(self, state: State, memory: dict[str, np.ndarray]) -> None:
         """Go on exactly where :meth:`memory` was taken."""
         self.start(state)
         self._mode = memory["mode"]
-        self.dt, self._omega, self._indicator0, last, estimates, self._elastic = map(float, memory["scalars"])
-        self._last_estimate, self.estimates = int(last), int(estimates)
+        self.dt, self._omega, self._indicator0, last, estimates, self._elastic, urgent = map(float, memory["scalars"])
+        self._last_estimate, self.estimates, self._urgent = int(last), int(estimates), bool(urgent)
         self.reaction = memory["reaction"]
 
 

@@ -221,8 +221,8 @@ class HHT:
             live = np.repeat(self.space.lump(momentum.gamma) > 1e-3 * self._volume, shape[1])[free]
             level = float(np.mean(np.abs(force.ravel()[free][live]))) + float(np.mean(np.abs(inertia[live])))
             increment = float(np.abs((u - state.u).ravel()[free][live]).max()) + 1e-300
-            done = np.abs(r[live]).max() <= c.force_tolerance * level and correction <= c.correction_tolerance * increment
-            if done and settled:
+            balanced = np.abs(r[live]).max() <= c.force_tolerance * level
+            if balanced and correction <= c.correction_tolerance * increment and settled:
                 return _Trial(u, a, gamma, force, momentum.W, mass), iteration
             if iteration == c.max_iterations:
                 break

@@ -229,7 +229,7 @@ def symmetric_product(indptr, indices, data, x):  # type: ignore[no-untyped-def]
 
 
 def _unsigned(A: csr_array) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """CSR arrays with unsigned indices: the compiled loops then need no test for negative ones, and run 2.7 times faster."""
+    """CSR arrays with unsigned indices, which spares the compiled loops a test for negative ones: 2.7 times as fast."""
     return A.indptr.view(np.uint32), A.indices.view(np.uint32), A.data
 
 

@@ -69,7 +69,9 @@ class Options:
     deletion
         γ at which an element fails, in (0, 0.01].
     event_time
-        Longest dynamic event [s], > 0; it ends when the sample has come apart.
+        Longest dynamic event [s], > 0.
+    aftermath
+        Time for which the event goes on after the sample has come apart [s], >= 0.
     record_every
         Time between rows of history.csv [s], > 0.
     frame_every
@@ -103,7 +105,7 @@ class Options:
     hht_alpha: float = -0.05
     hht_dt: float = 1.6e-7
     coupling: str = "iterated"
-    courant: float = 0.9
+    courant: float = 0.8
     gamma_every: int = 5
     sink: str = "lumped"
     element: str = "jbar"
@@ -112,6 +114,7 @@ class Options:
     mass_floor: float = 1e-3
     deletion: float = 1e-6
     event_time: float = 2e-4
+    aftermath: float = 1e-5
     record_every: float = 1e-6
     frame_every: float = 5e-6
     balance_tolerance: float = 0.05
@@ -138,7 +141,8 @@ class Options:
         """How to compute."""
         return Controls(
             self.analysis, self.integrator, self.sink, self.element, self.overshoot, self.deletion, self.force_floor,
-            self.event_time, self.record_every, self.frame_every, self.balance_tolerance, self.checkpoint_every,
+            self.event_time, self.aftermath, self.record_every, self.frame_every, self.balance_tolerance,
+            self.checkpoint_every,
             self.threads, ExplicitControls(self.courant, self.gamma_every, self.mass_floor),
             HHTControls(self.hht_alpha, self.hht_dt, coupling=self.coupling))
 

@@ -4,48 +4,67 @@ from __future__ import annotations
 
 import signal
 import threading
+import time
 from types import FrameType, TracebackType
 from typing import Any
 
-from rich.console import Console
-from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.console import Console, Group
+from rich.live import Live
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.text import Text
 
 __all__ = ["Display", "Interrupt"]
 
 
 class Display:
-    """A progress line a phase; silent when `quiet`."""
+    """A progress line a phase with the figures below it; a line every ten seconds where there is no terminal."""
+
+    LOG_EVERY = 10.0  # seconds
 
     def __init__(self, quiet: bool = False) -> None:
         self.console = Console(stderr=True, quiet=quiet)
+        self._quiet = quiet
         self._progress = Progress(
-            SpinnerColumn(), TextColumn("[bold]{task.description:<12}"), BarColumn(24),
-            TextColumn("{task.percentage:>4.0f} %"), TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn(),
-            TextColumn("{task.fields[figures]}"), console=self.console, disable=quiet)
+            TextColumn("[bold]{task.description:<12}"), BarColumn(24), TextColumn("{task.percentage:>3.0f} %"),
+            TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn(), console=self.console)
+        self._figures = Text(style="cyan")
+        self._live = Live(Group(self._progress, self._figures), console=self.console, refresh_per_second=4)
         self._task: Any = None
+        self._phase = ""
+        self._logged = 0.0
 
     def __enter__(self) -> Display:
-        self._progress.start()
+        if self.console.is_terminal and not self._quiet:
+            self._live.start()
         return self
 
     def __exit__(self, kind: type[BaseException] | None, value: BaseException | None,
                  trace: TracebackType | None) -> None:
-        self._progress.stop()
+        self._figures.plain = ""
+        self._live.stop()
 
     def phase(self, name: str) -> None:
         """Begin a new phase."""
         if self._task is not None:
             self._progress.update(self._task, completed=1.0)
             self._progress.stop_task(self._task)
-        self._task = self._progress.add_task(name, total=1.0, figures="")
+        self._task = self._progress.add_task(name, total=1.0)
+        self._phase = name
+        if not self.console.is_terminal:
+            self.say(name)
 
     def update(self, fraction: float, figures: str) -> None:
-        """Show that `fraction` of the phase is done, and `figures` beside it."""
-        self._progress.update(self._task, completed=min(max(fraction, 0.0), 1.0), figures=figures)
+        """Show that `fraction` of the phase is done, and `figures` below it."""
+        fraction = min(max(fraction, 0.0), 1.0)
+        self._progress.update(self._task, completed=fraction)
+        self._figures.plain = figures
+        if not self.console.is_terminal and time.monotonic() - self._logged > self.LOG_EVERY:
+            self._logged = time.monotonic()
+            self.say(f"{self._phase} {fraction:.0%}  {figures}")
 
     def say(self, text: str) -> None:
         """A line above the progress."""
-        self.console.print(text, highlight=False)
+        self.console.print(text, highlight=False, soft_wrap=True)
 
 
 class Interrupt:

@@ -21,6 +21,8 @@ __all__ = ["Recorder"]
 class Recorder:
     """Writes the history and the series of one run, follows the crack, and guards the energy balance.
 
+    `memory` is what :meth:`memory` gave for a checkpoint, to go on from there.
+
     Attributes
     ----------
     tracker: the crack.   tips: the crack at the last record.
@@ -28,28 +30,33 @@ class Recorder:
     onset, at_arrival: figures noted at those moments.
     """
 
-    def __init__(self, scene: Scene, folder: Path, momentum: Momentum, density: DensitySolver) -> None:
+    def __init__(self, scene: Scene, folder: Path, momentum: Momentum, density: DensitySolver,
+                 memory: dict[str, Any] | None = None) -> None:
         self.scene, self.momentum, self.density = scene, momentum, density
         sample, space = scene.sample, scene.sample.space
         held = [sample.nodes(grip.boundary) for grip in scene.grips]
         named = [grip.boundary for grip in scene.grips] + list(scene.notch)
         self.tracker = CrackTracker(space, scene.sink_law.length_scale, scene.material.shear_wave_speed, held,
                                     sample.free_edge(*named))
-        self.history = History(folder / "history.csv")
+        self.history = History(folder / "history.csv", memory["rows"] if memory else ())
+        (folder / "series").mkdir(exist_ok=True)
         self.series = Series(folder / "series", "run", space)
         self.tips: Tips = self.tracker.look(0.0, np.ones(space.n_nodes))
         self.tracker.track.clear()
-        self.moments: dict[str, int] = {}
-        self.frames: list[tuple[float, str]] = []
-        self.onset: dict[str, float] = {}
-        self.at_arrival: dict[str, float] = {}
+        memory = memory or {"frames": [], "moments": {}, "onset": {}, "at_arrival": {}}
+        self.frames: list[tuple[float, str]] = [(float(t), str(label)) for t, label in memory["frames"]]
+        self.moments: dict[str, int] = dict(memory["moments"])
+        self.onset: dict[str, float] = dict(memory["onset"])
+        self.at_arrival: dict[str, float] = dict(memory["at_arrival"])
+        self.separated_at = float(memory.get("separated_at", np.inf))   #: first record after the separation [s]
+        self.series.resume(len(self.frames))
         self._load_nodes = held[0]
         first = np.array([v or 0.0 for v in scene.grips[0].velocity])
         self._load_direction = first / (np.linalg.norm(first) or 1.0)
         controls = scene.controls
         quasistatic = controls.analysis == "quasistatic"
-        self._record_every = 5.0 if quasistatic else controls.record_every
-        self._frame_every = 25.0 if quasistatic else controls.frame_every
+        self._record_every = 1.0 if quasistatic else controls.record_every
+        self._frame_every = 10.0 if quasistatic else controls.frame_every
 
     # --- loading ---
     def loading(self, state: State, reaction: np.ndarray) -> None:
@@ -113,6 +120,8 @@ class Recorder:
     def _record(self, state: State, reaction: np.ndarray, dt: float) -> None:
         self.tips = self.tracker.look(state.time, state.gamma)
         self.history.append(self._row(state, reaction, self.tips, dt))
+        if self.tracker.separated:
+            self.separated_at = min(self.separated_at, state.time)
         self._guard(state)
 
     def _guard(self, state: State) -> None:
@@ -131,7 +140,7 @@ class Recorder:
         x[:tips.position.size] = tips.position
         quasistatic = state.phase == "event" and self.scene.controls.analysis == "quasistatic"
         return {
-            "phase": state.phase, "step": state.step, "time_s": state.time,
+            "phase": state.phase, "step": state.step, "time_s": 0.0 if quasistatic else state.time,
             "grip_displacement_mm": state.grip * self.scene.speed, "reaction_N_per_mm": self.load(reaction),
             "elastic": ledger.elastic, "kinetic": ledger.kinetic, "work": ledger.work,
             "sink_stored": ledger.sink_stored, "sink_kinetic": ledger.sink_kinetic, "deletion": ledger.deletion,
@@ -145,12 +154,4 @@ class Recorder:
     def memory(self) -> dict[str, Any]:
         """What goes into a checkpoint as JSON; the tracker's arrays go beside it."""
         return {"rows": self.history.rows, "frames": self.frames, "moments": self.moments, "onset": self.onset,
-                "at_arrival": self.at_arrival}
-
-    def restore(self, extra: dict[str, Any], tracker: dict[str, np.ndarray]) -> None:
-        """Take up what :meth:`memory` and the tracker's memory gave."""
-        self.history.restore(extra["rows"])
-        self.frames = [(float(t), str(label)) for t, label in extra["frames"]]
-        self.series.resume(len(self.frames))
-        self.moments, self.onset, self.at_arrival = extra["moments"], extra["onset"], extra["at_arrival"]
-        self.tracker.restore(tracker)
+                "at_arrival": self.at_arrival, "separated_at": self.separated_at}

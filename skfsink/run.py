@@ -95,16 +95,13 @@ def _run_one(make_scene: SceneMaker, own: dict[str, Any], options: Options, fold
         prepare_folder(folder, options.overwrite)
         (folder / Simulation.CHECKPOINT).unlink(missing_ok=True)
         write_atomic(folder / "scene.toml", scene.toml())
-    simulation = Simulation(scene, folder, display)
-    if options.resume is not None:
-        simulation.resume()
+    simulation = Simulation(scene, folder, display, options.resume is not None)
     space = scene.sample.space
     display.say(f"{scene.title}, mesh {scene.sample.name}: {space.n_elements} elements, "
                 f"{int(simulation.free.sum())} + {space.n_nodes} unknowns; {options.analysis} analysis in {folder}")
     state = simulation.run(None if onset is None else onset_copy(onset))
     display.phase("output")
     display.update(0.0, "")
-    simulation.recorder.history.flush()
     draw_run(scene, folder, simulation.recorder)
     simulation._lap("output")
     summary = summarize(scene, simulation)

@@ -116,10 +116,7 @@ def _from_meshio(name: str, data: meshio.Mesh) -> Sample:
         raise MeshError(f"mesh {name} has elements with nodes that do not exist")
     dim = 2 if kind == "quad" else 3
     points = np.asarray(data.points, float)[:, :dim]
-    if kind == "quad":
-        connectivity = cells.T
-    else:
-        connectivity = cells[:, HEX_MAPPING[:8]].T
+    connectivity = cells.T if kind == "quad" else cells[:, HEX_MAPPING[:8]].T
     space = Space(mesh_class(np.ascontiguousarray(points.T), np.ascontiguousarray(connectivity.astype(np.int64))))
     return Sample(name, space, _boundaries(data, facet))
 

@@ -52,10 +52,11 @@ class Controls:
     integrator: "explicit" or "hht", for the dynamic event.
     sink: "lumped", "consistent" or "nearest".
     element: "jbar" or "plain".
-    overshoot: how far past the onset the state is scaled before the event, relative to the onset displacement, (0, 0.1].
+    overshoot: how far past the onset the state is scaled before the event, relative to the displacement, (0, 0.1].
     deletion: gamma at which an element fails, (0, 1e-2].
     force_floor: gamma below which a Gauss point exerts no force, [0, 0.1].
-    event_time: longest dynamic event [s], > 0; it ends earlier when the sample has come apart.
+    event_time: longest dynamic event [s], > 0.
+    aftermath: time for which it goes on after the sample has come apart [s], >= 0.
     record_every: time between rows of the history [s], > 0.
     frame_every: time between frames of the ParaView series [s], > 0.
     balance_tolerance: balance error, relative to the onset energy, at which a run is stopped, (0, 1].
@@ -71,6 +72,7 @@ class Controls:
     deletion: float = 1e-6
     force_floor: float = 1e-3
     event_time: float = 2e-4
+    aftermath: float = 1e-5
     record_every: float = 1e-6
     frame_every: float = 5e-6
     balance_tolerance: float = 0.05
@@ -90,6 +92,7 @@ class Controls:
         require("force-floor", self.force_floor, low=0, high=0.1)
         for name in ("event_time", "record_every", "frame_every", "checkpoint_every"):
             require(name.replace("_", "-"), getattr(self, name), "s", low=0, low_open=True)
+        require("aftermath", self.aftermath, "s", low=0)
         require("balance-tolerance", self.balance_tolerance, low=0, high=1, low_open=True)
         require("threads", self.threads, low=1, high=256)
 

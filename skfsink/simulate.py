@@ -35,12 +35,20 @@ class Simulation:
     scene: what to run; its analysis is "dynamic" or "quasistatic".
     folder: where `history.csv`, the series and the checkpoint go; it must exist.
     display: what the person sees.
+    resume: take up the run where the checkpoint in `folder` left it.
+
+    Raises
+    ------
+    CheckpointError
+        The checkpoint to resume from is missing, damaged, or of another scene or version.
     """
 
     CHECKPOINT = "checkpoint.npz"
     ONSET = "onset.npz"
 
-    def __init__(self, scene: Scene, folder: Path, display: Display) -> None:
+    def __init__(self, scene: Scene, folder: Path, display: Display, resume: bool = False) -> None:
+        # a checkpoint that cannot be used is refused before any file is touched
+        stored = load_checkpoint(folder / self.CHECKPOINT, scene.fingerprint) if resume else None
         self.scene, self.folder, self.display = scene, folder, display
         c, space = scene.controls, scene.sample.space
         self.free, self.grip_velocity = scene.constraints()
@@ -48,12 +56,15 @@ class Simulation:
         self.density = DensitySolver(space, scene.sink_law, c.sink)
         self.statics = Statics(self.momentum, self.density, self.free, self.grip_velocity, c.statics, c.deletion,
                                c.threads)
-        self.recorder = Recorder(scene, folder, self.momentum, self.density)
+        self.recorder = Recorder(scene, folder, self.momentum, self.density,
+                                 stored[2]["recorder"] if stored else None)
         self.state = State.intact(space)
         self.integrator: Explicit | HHT | None = None
         self.wall = {"loading": 0.0, "event": 0.0, "output": 0.0}
         self.counts = {"steps": 0, "gamma_solves": 0, "factorisations": 0}
         self._saved = self._clock = time.perf_counter()
+        if stored:
+            self._restore(*stored)
 
     # --- the phases ---
     def run(self, onset: State | None = None) -> State:
@@ -82,7 +93,7 @@ class Simulation:
         state = self.state
         tolerance = self.scene.controls.statics.onset_tolerance
         started = False
-        for state in self.statics.load(state):
+        for _ in self.statics.load(state):
             reaction = self.momentum.force(state.u)
             self.recorder.loading(state, reaction)
             started = True
@@ -138,7 +149,7 @@ class Simulation:
             if recorder.watch(state, integrator.reaction, before, integrator.dt):
                 self._show(state, state.time / end, f"{state.time * 1e6:.1f} µs")
             before = state.time
-            if recorder.tracker.separated:
+            if recorder.tracker.separated and state.time >= recorder.separated_at + self.scene.controls.aftermath:
                 break
             self._pause("event")
         integrator.sync(state)
@@ -153,7 +164,7 @@ class Simulation:
             if recorder.watch(state, self.momentum.force(state.u), before, 0.0):
                 self._show(state, 0.0, f"sweep {state.step}")
             before = state.time
-            if recorder.tracker.separated and state.ledger.elastic < 1e-4 * scale:
+            if recorder.tracker.separated and (self.statics.settled or state.ledger.elastic < 1e-4 * scale):
                 break
             self._pause("event")
         recorder.finish(state, self.momentum.force(state.u), 0.0)
@@ -203,17 +214,9 @@ class Simulation:
         save_checkpoint(self.folder / self.CHECKPOINT, self.scene.fingerprint, self.state, memories,
                         {"recorder": self.recorder.memory(), "cost": self.cost()})
 
-    def resume(self) -> None:
-        """Take up the run where its checkpoint left it.
-
-        Raises
-        ------
-        CheckpointError
-            The checkpoint is missing, damaged, or of another scene or version.
-        """
-        state, memories, extra = load_checkpoint(self.folder / self.CHECKPOINT, self.scene.fingerprint)
+    def _restore(self, state: State, memories: dict[str, Any], extra: dict[str, Any]) -> None:
         self.state = state
-        self.recorder.restore(extra["recorder"], memories["tracker"])
+        self.recorder.tracker.restore(memories["tracker"])
         self.statics.restore(memories["statics"])
         self.density.restore(memories.get("density", {}))
         cost = extra["cost"]

@@ -79,13 +79,17 @@ class Statics:
         self.pattern = Pattern(self.space, self.space.dim, free, upper=True)
         self.solver = Factorization(self.pattern, threads=threads)
         self._volume = self.space.lump(np.ones_like(self.space.w))
+        # a body that has come apart bears no force; this says what counts as none
+        size = float(self.space.V.sum()) ** (1 - 1 / self.space.dim)
+        self._least_force = 1e-3 * momentum.material.shear_modulus * size
         self.newton_steps = 0
+        self.settled = False      #: whether the last sweep of `propagate` found nothing left to change
         self.increment = 0.0      #: current load increment, as load time [s]; 0 before the first
         self._stale = True
 
     # --- equilibrium at fixed gamma ---
     def _live(self) -> np.ndarray:
-        live = self.space.lump(self.momentum.gamma) > self.LIVE * self._volume
+        live: np.ndarray = self.space.lump(self.momentum.gamma) > self.LIVE * self._volume
         return np.repeat(live, self.space.dim)[self.free]
 
     def equilibrium(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -100,10 +104,11 @@ class Statics:
         u = u.copy()
         force = momentum.force(u)
         energy = momentum.energy
+        lowest = min(self.LEAST_J, momentum.least_J)
         last, fresh = np.inf, False
         for _ in range(c.max_newton):
             r = force.ravel()[self.free]
-            error = float(np.linalg.norm(r[live]) / (np.linalg.norm(force) + 1e-300))
+            error = float(np.linalg.norm(r[live]) / (np.linalg.norm(force) + self._least_force))
             if error <= c.tolerance:
                 return u, force
             self.newton_steps += 1
@@ -114,7 +119,7 @@ class Statics:
             d = self.solver.solve(-r, tolerance=1e-6)
             slope = float(r @ d)
             if slope >= 0:  # indefinite tangent: go down the gradient, scaled by the diagonal
-                diagonal = np.abs(self.solver._matrix.diagonal())  # type: ignore[union-attr]
+                diagonal = np.abs(momentum.tangent(self.pattern, u)[self.pattern.diagonal])
                 d = -r / np.maximum(diagonal, 1e-12 * diagonal.max())
                 slope = float(r @ d)
             step = np.zeros(u.size)
@@ -123,7 +128,7 @@ class Statics:
             length = 1.0
             while True:
                 trial = momentum.force(u + length * step)
-                fits = momentum.least_J > self.LEAST_J and np.isfinite(momentum.energy)
+                fits = momentum.least_J >= lowest and np.isfinite(momentum.energy)
                 if fits and momentum.energy <= energy + 1e-4 * length * slope + 1e-13 * abs(energy):
                     break
                 length *= 0.5
@@ -221,13 +226,20 @@ class Statics:
             yield state
 
     # --- quasi-static propagation ---
-    def propagate(self, state: State) -> Iterator[State]:
-        """Let the crack run at fixed grips, yielding after each sweep, until gamma no longer changes.
+    def propagate(self, state: State, advance: float = 0.005, limit: float = 3.0) -> Iterator[State]:
+        """Let the crack run through equilibria, yielding after each sweep; the caller stops when it has crossed.
 
         A sweep: equilibrium at fixed gamma (the energy it gives up is `released`), then the history, gamma and the
-        deletions at fixed displacement (what they take is D).
+        deletions at fixed displacement (what they take is D). The grips stand still while the crack runs; where it
+        arrests, `settled` is set, and the next sweep moves them on by `advance` times their displacement.
+
+        Raises
+        ------
+        ConvergenceError
+            The crack has not crossed at `limit` times the displacement of the start.
         """
         ledger = state.ledger
+        furthest = limit * state.grip
         if state.step == 0:
             self.momentum.set_gamma(state.gamma, state.deleted)
             self.momentum.force(state.u)
@@ -235,10 +247,15 @@ class Statics:
         while True:
             self.momentum.set_gamma(state.gamma, state.deleted)
             self.momentum.force(state.u)
-            before = self.momentum.energy
             self._stale = True  # so that a sweep depends on the state alone
-            state.u, _ = self.equilibrium(state.u)
-            ledger.released += before - self.momentum.energy
+            if self.settled:
+                self._advance(state, advance * state.grip)
+                if state.grip > furthest:
+                    raise ConvergenceError(f"the crack has not crossed the sample at {limit:g} times the onset load")
+            else:
+                before = self.momentum.energy
+                state.u, _ = self.equilibrium(state.u)
+                ledger.released += before - self.momentum.energy
             W = self.momentum.W
             state.W_max = np.maximum(state.W_max, W)
             gamma = self.density.solve(state.W_max, state.gamma)
@@ -253,16 +270,24 @@ class Statics:
             ledger.drop(self.space.w, W, old, undeleted)
             ledger.deletion += float(np.einsum("eq,eq,eq->", self.space.w, W, undeleted - self.momentum.gamma))
             ledger.elastic = float(np.einsum("eq,eq,eq->", self.space.w, W, self.momentum.gamma))
+            self.settled = change <= self.controls.gamma_tolerance
             yield state
-            if change <= self.controls.gamma_tolerance:
-                return
+
+    def _advance(self, state: State, increment: float) -> None:
+        """Move the grips on by a load time `increment` at fixed gamma, to the new equilibrium."""
+        held = ~self.free.reshape(state.u.shape)
+        force = self.momentum.force(state.u)
+        u, new_force = self.equilibrium(self._predict(state.u, increment))
+        state.ledger.work += 0.5 * float(np.sum((force + new_force)[held] * (u - state.u)[held]))
+        state.u = u
+        state.grip += increment
 
     # --- checkpoints ---
     def memory(self) -> dict[str, np.ndarray]:
         """What loading remembers beyond the state."""
-        return {"increment": np.array(self.increment)}
+        return {"increment": np.array(self.increment), "settled": np.array(self.settled)}
 
     def restore(self, memory: dict[str, np.ndarray]) -> None:
         """Take up what :meth:`memory` gave."""
-        self.increment = float(memory["increment"])
+        self.increment, self.settled = float(memory["increment"]), bool(memory["settled"])
         self._stale = True

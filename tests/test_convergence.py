@@ -48,9 +48,13 @@ class Waves:
     s: np.ndarray
 
     @classmethod
-    def of(cls, dim: int, size: float) -> Waves:
+    def of(cls, dim: int, size: float, isochoric: bool) -> Waves:
+        """Three random waves; transverse ones if `isochoric`, so that J = 1 but for products of two of them."""
         rng = np.random.default_rng(dim)
-        return cls(rng.uniform(-size, size, (3, dim)), rng.uniform(-2.5, 2.5, (3, dim)), rng.uniform(0, 6, 3))
+        k, a = rng.uniform(-2.5, 2.5, (3, dim)), rng.uniform(-size, size, (3, dim))
+        if isochoric:
+            a -= k * ((a * k).sum(axis=1) / (k * k).sum(axis=1))[:, None]
+        return cls(a, k, rng.uniform(0, 6, 3))
 
     def u(self, X: np.ndarray) -> np.ndarray:
         return np.einsum("mi,m...->i...", self.a, np.sin(self._phase(X)))
@@ -71,7 +75,7 @@ class Waves:
 
 def elastic_error(space: Space, material: Material, element: str = "jbar") -> float:
     """L2 error of the displacement for the wavy solution, held at the boundary and driven by its body force."""
-    exact = Waves.of(space.dim, 0.05)
+    exact = Waves.of(space.dim, 0.05, isochoric=material.bulk_modulus > 100)
     fine = skfem.Basis(space.mesh, space.u_basis.elem, intorder=5)
     X = np.asarray(fine.global_coordinates())
     load = skfem.LinearForm(lambda v, w: dot(w["b"], v)).assemble(fine, b=exact.body_force(X, material))
@@ -82,13 +86,24 @@ def elastic_error(space: Space, material: Material, element: str = "jbar") -> fl
     return float(np.sqrt((difference**2 * fine.dx).sum()))
 
 
-@pytest.mark.parametrize("bulk", [500.0, 5.0])
+@pytest.mark.parametrize("bulk", [500.0, 5.0], ids=["nearly incompressible", "compressible"])
 def test_displacement_converges_with_order_two(kind: str, bulk: float):
-    """Fails if force, J_bar or geometry are inconsistent: finite strain on distorted meshes, nearly incompressible or not."""
+    """Fails if force, J_bar, geometry or tangent are inconsistent: finite strain on distorted meshes.
+
+    At k = 500 MPa the solution is nearly isochoric, as those of the paper are. Under pressures of 100 MPa the element
+    keeps its order on distorted quads only beyond 64 elements an edge, and has none on hexes of up to 16 an edge.
+    """
     errors = [elastic_error(box(kind, n, 0.15), AAA(bulk_modulus=bulk)) for n in SIZES[kind]]
     order = rates(SIZES[kind], errors)
-    print(kind, bulk, errors, order)
     assert ((order > 1.85) & (order < 2.2)).all(), (errors, order)
+    assert errors[-1] < 1e-4
+
+
+def test_plain_element_is_behind_at_low_compressibility():
+    """Fails if `element="plain"` is not the standard element, which has an order below 1.5 on these meshes."""
+    errors = [elastic_error(box("quad", n, 0.15), AAA(), "plain") for n in SIZES["quad"]]
+    assert (rates(SIZES["quad"], errors) < 1.6).all(), errors
+    assert errors[-1] > 3 * elastic_error(box("quad", SIZES["quad"][-1], 0.15), AAA())
 
 
 def density_error(space: Space, sink: str) -> float:
@@ -119,12 +134,12 @@ def test_density_converges_with_order_two(kind: str, sink: str):
     """Fails if the flux, the sink, its lumping or the load is wrong by any factor."""
     errors = [density_error(box(kind, n, 0.15), sink) for n in SIZES[kind]]
     order = rates(SIZES[kind], errors)
-    print(kind, sink, errors, order)
     assert ((order > 1.85) & (order < 2.2)).all(), (errors, order)
+    assert errors[-1] < 2e-3
 
 
 def cook(n: int, element: str, material: Material, traction: float) -> float:
-    """Vertical displacement [mm] of the upper right corner of Cook's membrane, clamped left, sheared at the right end."""
+    """Rise [mm] of the upper right corner of Cook's membrane, clamped left, sheared at the right end."""
     mesh = grid("quad", (n, n))
     x, y = mesh.p
     space = Space(skfem.MeshQuad(np.array([48 * x, 44 * x + (44 - 28 * x) * y]), mesh.t))
@@ -143,9 +158,10 @@ def test_mean_jacobian_does_not_lock_and_the_plain_element_does():
     """Fails if J_bar is not really in the force, or the plain element is not plain: Cook's membrane at k/mu = 405."""
     material = NeoHookean()
     assert material.bulk_modulus / material.shear_modulus == pytest.approx(405, abs=0.5)
-    traction = 0.02
+    traction = 0.005
     reference = cook(64, "jbar", material, traction)
-    for n in (8, 16):
-        mean, plain = cook(n, "jbar", material, traction), cook(n, "plain", material, traction)
-        print(n, mean / reference, plain / reference)
-    assert abs(reference) > 1.0
+    assert 0.35 < reference < 0.5  # mm, of a membrane 44 mm high: small strains
+    mean, plain = cook(16, "jbar", material, traction), cook(16, "plain", material, traction)
+    assert mean == pytest.approx(reference, rel=0.03)
+    assert plain < 0.6 * reference
+    assert cook(8, "jbar", material, traction) == pytest.approx(reference, rel=0.08)

@@ -178,9 +178,9 @@ _SIGNATURE = float64(LAW, _c(float64, 1, "C"), float64, _c(types.uint32, 3, "C")
 
 @njit(_SIGNATURE, cache=True, fastmath=FAST, nogil=True)
 def force_2d(law, constants, k_bulk, conn, x, geometry, gamma, j_bar, force, W, psi):  # type: ignore[no-untyped-def]
-    L = LANES
     Q = 4 * LANES
-    ws, z, t, p, ab = np.empty(_ROWS * LANES), np.empty(8 * LANES), np.empty(4 * Q), np.empty(2 * LANES), np.empty(2 * Q)
+    ws, z = np.empty(_ROWS * LANES), np.empty(8 * LANES)
+    t, p, ab = np.empty(4 * Q), np.empty(2 * LANES), np.empty(2 * Q)
     pressure, volumetric, ddpsi = np.empty(Q), np.empty(Q), np.empty(Q)
     J, I1, R, psi_q = ws[4 * Q:5 * Q], ws[5 * Q:6 * Q], ws[6 * Q:7 * Q], ws[7 * Q:8 * Q]
     dpsi, floored = ws[8 * Q:9 * Q], ws[9 * Q:10 * Q]
