@@ -4,7 +4,7 @@ Velocity form of the scheme, for the free degrees of freedom:
 
     u_{n+1} = u_n + dt (v_n + dt/2 a_n),   m a_{n+1} = -f(u_{n+1}),   v_{n+1} = v_n + dt/2 (a_n + a_{n+1}).
 
-gamma multiplies stiffness and mass alike, so damage does not lower the stable step. Every `gamma_every` steps gamma is
+gamma multiplies stiffness and mass alike, so damage does not lower the stable step. Every few steps gamma is
 solved anew; accelerations are kept when the mass changes with it.
 
 With V the mean velocity of a step and f_n = -m a_n, the scheme obeys, exactly,
@@ -42,21 +42,21 @@ class ExplicitControls:
     Parameters
     ----------
     courant: step as a fraction of the estimated stability limit 2/omega_max, in (0, 1].
-    gamma_every: steps between solves for gamma, >= 1.
+    gamma_every: steps between solves for gamma, >= 1; 0 takes as many as fit in `GAMMA_INTERVAL` l/c_s.
     mass_floor: least lumped mass, as a fraction of the intact one, in [0, 1).
     estimate_every: steps after which omega_max is estimated again at the latest, >= 1.
     estimate_change: relative change of the cheap indicator that calls for a new estimate, in (0, 1).
     """
 
     courant: float = 0.8
-    gamma_every: int = 5
+    gamma_every: int = 0
     mass_floor: float = 1e-3
     estimate_every: int = 400
     estimate_change: float = 0.05
 
     def __post_init__(self) -> None:
         require("courant", self.courant, low=0, high=1, low_open=True)
-        require("gamma-every", self.gamma_every, "steps", low=1)
+        require("gamma-every", self.gamma_every, "steps", low=0)
         require("mass-floor", self.mass_floor, low=0, high=1, high_open=True)
         require("estimate-every", self.estimate_every, "steps", low=1)
         require("estimate-change", self.estimate_change, low=0, high=1, low_open=True, high_open=True)
@@ -97,6 +97,7 @@ class Explicit:
     dt: the current step [s].   estimates: frequency estimates made.   reaction: (n, dim) internal force.
     """
 
+    GAMMA_INTERVAL = 0.03  # l/c_s between solves for gamma; the crack then runs less than 3 % of l
     CHECK = 5        # steps between looks at the cheap indicator
     FED_IN = 1e-6    # energy a step may feed in before omega_max is estimated at once, of the initial energy
 
@@ -116,6 +117,7 @@ class Explicit:
         self._indicator0 = 0.0
         self._last_estimate = 0
         self._urgent = False
+        self._since_gamma = 0
 
     def start(self, state: State) -> None:
         """Forces, masses and accelerations of `state`; to be called once before stepping, and after a resume."""
@@ -169,7 +171,9 @@ class Explicit:
         state.time += dt
         state.grip += dt
         state.step += 1
-        if state.step % self.controls.gamma_every == 0:
+        self._since_gamma += 1
+        if self._since_gamma >= self._gamma_every:
+            self._since_gamma = 0
             self.update_density(state)
         if state.step % 100 == 0 and not np.isfinite(kinetic + elastic):
             raise InstabilityError(f"the explicit integration blew up at t = {state.time:.4g} s (step {state.step}): "
@@ -201,6 +205,14 @@ class Explicit:
         """Bring `state.W_max` up to date; between density solves the integrator keeps it tiled."""
         state.W_max = self.momentum.tiles.untile(self._W_max)
 
+    @property
+    def _gamma_every(self) -> int:
+        """Steps between solves for gamma."""
+        if self.controls.gamma_every:
+            return self.controls.gamma_every
+        transit = self.density.law.length_scale / (self.momentum.material.shear_wave_speed * 1e3)
+        return max(1, int(self.GAMMA_INTERVAL * transit / self.dt))
+
     # --- the step size ---
     def _set_step(self, state: State) -> None:
         c = self.controls
@@ -226,15 +238,18 @@ class Explicit:
         """What the integrator remembers beyond the state, for a checkpoint."""
         assert self._mode is not None
         return {"mode": self._mode, "scalars": np.array([self.dt, self._omega, self._indicator0,
-                                                         self._last_estimate, self.estimates, self._elastic, self._urgent]),
+                                                         self._last_estimate, self.estimates, self._elastic, self._urgent,
+                                                         self._since_gamma]),
                 "reaction": self.reaction}
 
     def restore(self, state: State, memory: dict[str, np.ndarray]) -> None:
         """Go on exactly where :meth:`memory` was taken."""
         self.start(state)
         self._mode = memory["mode"]
-        self.dt, self._omega, self._indicator0, last, estimates, self._elastic, urgent = map(float, memory["scalars"])
-        self._last_estimate, self.estimates, self._urgent = int(last), int(estimates), bool(urgent)
+        scalars = [float(value) for value in memory["scalars"]]
+        self.dt, self._omega, self._indicator0, self._elastic = scalars[0], scalars[1], scalars[2], scalars[5]
+        self._last_estimate, self.estimates = int(scalars[3]), int(scalars[4])
+        self._urgent, self._since_gamma = bool(scalars[6]), int(scalars[7])
         self.reaction = memory["reaction"]
 
 

@@ -52,10 +52,12 @@ class Options:
         Largest time step of HHT [s], > 0.
     coupling
         Of the two fields in an HHT step: "iterated" or "single" (one pass).
+    mass
+        Of HHT: "lumped" (row sums, as in the explicit scheme) or "consistent" (the paper's).
     courant
         Explicit step over the stability limit estimated for the deformed state, in (0, 1].
     gamma_every
-        Explicit steps between solves for γ, >= 1.
+        Explicit steps between solves for γ, >= 1; 0 takes as many as fit in 0.03 l/c_s (0.1 µs).
     sink
         Quadrature of the sink: "lumped" (row sums), "consistent" (the paper's) or "nearest" (node).
     element
@@ -105,8 +107,9 @@ class Options:
     hht_alpha: float = -0.05
     hht_dt: float = 1.6e-7
     coupling: str = "iterated"
+    mass: str = "lumped"
     courant: float = 0.8
-    gamma_every: int = 5
+    gamma_every: int = 0
     sink: str = "lumped"
     element: str = "jbar"
     overshoot: float = 0.005
@@ -144,7 +147,7 @@ class Options:
             self.event_time, self.aftermath, self.record_every, self.frame_every, self.balance_tolerance,
             self.checkpoint_every,
             self.threads, ExplicitControls(self.courant, self.gamma_every, self.mass_floor),
-            HHTControls(self.hht_alpha, self.hht_dt, coupling=self.coupling))
+            HHTControls(self.hht_alpha, self.hht_dt, coupling=self.coupling, mass=self.mass))
 
     def parameters(self) -> dict[str, Any]:
         """The options that decide results, by name."""

@@ -214,16 +214,14 @@ class Series:
         return self.folder / f"{self.name}_{number:04d}.vtu"
 
     def add(self, time: float, point_data: Mapping[str, np.ndarray], cell_data: Mapping[str, np.ndarray]) -> None:
-        """Write a frame, then name it in the PVD file.
+        """Write a frame of (n,) or (n, dim) arrays on points and (ne,) or (ne, dim) on cells, then name it in the PVD file.
 
-        `point_data` has (n,) or (n, dim) arrays, `cell_data` (ne,) or (ne, dim). Vectors get a third component, floats
-        single precision, flags become bytes.
+        Vectors get a third component; floats are stored in single precision, flags as bytes.
         """
         points = {name: _field(values) for name, values in point_data.items()}
         cells = {name: [_field(values)] for name, values in cell_data.items()}
-        mesh = meshio.Mesh(self._points, self._cells, points, cells)
         with replaced(self.frame(len(self.times))) as part:
-            meshio.write(part, mesh, "vtu", compression="zlib")
+            meshio.write(part, meshio.Mesh(self._points, self._cells, points, cells), "vtu", compression="zlib")
         self.times.append(float(time))
         self._write_index()
 
@@ -272,13 +270,7 @@ def _vectors(values: np.ndarray) -> np.ndarray:
 
 # --- the summary ---
 def write_summary(path: str | Path, summary: Mapping[str, Any]) -> None:
-    """Write the results of a run as JSON; arrays become lists.
-
-    Raises
-    ------
-    OutputError
-        A number is not finite: the message names it.
-    """
+    """Write the results of a run as JSON, arrays as lists. An OutputError names a number that is not finite."""
     write_atomic(path, json.dumps(_plain(summary, "summary"), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
 
 

@@ -10,7 +10,7 @@ import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import matplotlib
 import numpy as np
@@ -20,7 +20,6 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection, TriMesh
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 from matplotlib.tri import Triangulation
 from PIL import Image
 from scipy.sparse import csr_array
@@ -50,9 +49,8 @@ STYLE: dict[Any, Any] = {
     "font.family": "DejaVu Sans", "font.size": 8, "axes.titlesize": 8, "axes.labelsize": 8, "axes.linewidth": 0.6,
     "figure.titlesize": 9, "legend.fontsize": 7, "legend.frameon": False, "xtick.labelsize": 7, "ytick.labelsize": 7,
     "xtick.major.width": 0.6, "ytick.major.width": 0.6, "lines.linewidth": 1.2}
-WIDTH, TALLEST = 7.2, 9.0  # of a picture [in]
-DPI = 300
-GIF_BYTES = 3_000_000
+WIDTH, TALLEST, DPI = 7.2, 9.0, 300  # size of a picture [in], dots per inch
+GIF_FRAMES = 60     # at the most, less than 3 MB
 SPENT = 1e-2        # nodes with a lower gamma carry nothing, and their displacement has no meaning
 LONGEST = 3.0       # stretch of an edge beyond which an element is torn
 LEAST_PIECE = 0.02  # of the body; smaller fragments do not widen the axes
@@ -86,14 +84,12 @@ class Frame:
 
 
 # --- the deformed body ---
-@dataclass(frozen=True)
-class _Body:
-    """A frame as it is drawn: triangles from back to front with x, y [mm], gamma and brightness of their corners,
-    (nt, 3, 4); lines along the edge of the body [mm], (lines, 2, 2); least and greatest x, y [mm], (2, 2)."""
+class _Body(NamedTuple):
+    """A frame as it is drawn."""
 
-    triangles: np.ndarray
-    outline: np.ndarray
-    box: np.ndarray
+    triangles: np.ndarray  # from back to front: x, y [mm], gamma and brightness of their corners, (nt, 3, 4)
+    outline: np.ndarray    # lines along the edge of a plane body [mm], (lines, 2, 2)
+    box: np.ndarray        # least and greatest x, y [mm], (2, 2)
 
 
 def live_elements(space: Space, frame: Frame) -> tuple[np.ndarray, np.ndarray]:
@@ -112,13 +108,22 @@ def live_elements(space: Space, frame: Frame) -> tuple[np.ndarray, np.ndarray]:
     return elements[whole], x[whole]
 
 
+def _bodies(space: Space, frames: Sequence[Frame], view: View) -> tuple[list[_Body], np.ndarray, float]:
+    """What to draw of the frames, the limits of the axes [mm] with a margin, (2, 2), and their height over width."""
+    bodies = [_body(space, frame, view) for frame in frames]
+    box = np.array([np.min([b.box[0] for b in bodies], axis=0), np.max([b.box[1] for b in bodies], axis=0)])
+    box += 0.02 * np.ptp(box, axis=0).max() * np.array([[-1], [1]])
+    width, height = box[1] - box[0]
+    return bodies, box, float(height / width)
+
+
 def _body(space: Space, frame: Frame, view: View) -> _Body:
     elements, x = live_elements(space, frame)
     gamma, facets = frame.gamma[space.conn[elements]], _FACETS[space.dim]
     if space.dim == 2:
-        outline = x[:, facets][_outer(space, np.arange(space.n_elements))[elements]]
+        edge = _outer(space, np.arange(space.n_elements))[elements] & (gamma[:, facets].min(axis=2) >= CRACKED)
         faces = np.dstack([x, gamma, np.ones_like(gamma)])[:, [0, 1, 3, 2]]
-        return _Body(_triangles(faces), outline, _box(space, elements, x, gamma))
+        return _Body(_triangles(faces), x[:, facets][edge], _box(space, elements, x, gamma))
     (ca, ce), (sa, se) = np.cos(np.radians(view)), np.sin(np.radians(view))
     x = x @ np.array([[-sa, ca, 0], [-ca * se, -sa * se, ce], [ca * ce, sa * ce, se]]).T  # right, up, to the observer
     box, surface = _box(space, elements, x[:, :, :2], gamma), _outer(space, elements)
@@ -136,14 +141,14 @@ def _triangles(faces: np.ndarray) -> np.ndarray:
     fan = np.stack([faces, np.roll(faces, -1, axis=1), centre], axis=2).reshape(-1, 3, 4)
     above = fan[:, :, 2] >= CRACKED
     count = above.sum(axis=1)
-    first = np.where(count == 1, above.argmax(axis=1), above.argmin(axis=1))  # the corner unlike the two others
-    a, b, c = (fan[np.arange(len(fan)), (first + k) % 3] for k in range(3))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ab, ac = (a + (b_ - a) * ((CRACKED - a[:, 2]) / (b_ - a)[:, 2])[:, None] for b_ in (b, c))
-    one, two = count == 1, count == 2
-    kept = [fan[count == 3], np.stack([a, ab, ac], axis=1)[one], np.stack([ab, b, c], axis=1)[two],
-            np.stack([ab, c, ac], axis=1)[two]]
-    order = np.concatenate([np.flatnonzero(which) for which in (count == 3, one, two, two)])
+    whole, rim = np.flatnonzero(count == 3), np.flatnonzero(count % 3)
+    one = count[rim] == 1
+    first = np.where(one, above[rim].argmax(axis=1), above[rim].argmin(axis=1))  # the corner unlike the two others
+    a, b, c = (fan[rim, (first + k) % 3] for k in range(3))
+    ab, ac = (a + (end - a) * (CRACKED - a[:, 2:3]) / (end - a)[:, 2:3] for end in (b, c))
+    kept = [fan[whole], *(np.stack(corners, axis=1)[mask] for corners, mask in
+                          (((a, ab, ac), one), ((ab, b, c), ~one), ((ab, c, ac), ~one)))]
+    order = np.concatenate([whole, rim[one], rim[~one], rim[~one]])
     return np.concatenate(kept)[np.argsort(order, kind="stable")]
 
 
@@ -157,20 +162,12 @@ def _outer(space: Space, elements: np.ndarray) -> np.ndarray:
 
 def _box(space: Space, elements: np.ndarray, x: np.ndarray, gamma: np.ndarray) -> np.ndarray:
     """Least and greatest x, y (2, 2) of the pieces of the body that are not small fragments."""
-    conn = space.conn[elements]
-    touches = csr_array(((gamma >= SPENT).ravel().astype(np.int8), conn.ravel(), np.arange(len(conn) + 1) * len(conn.T)),
-                        shape=(len(conn), space.n_nodes))
+    element, corner = np.nonzero(gamma >= SPENT)
+    touches = csr_array((np.ones(len(element), np.int8), (element, space.conn[elements[element], corner])))
     _, piece = connected_components(touches @ touches.T, directed=False)
     volume = np.bincount(piece, space.V[elements])
     kept = x[volume[piece] > LEAST_PIECE * volume.sum()].reshape(-1, 2)
     return np.array([kept.min(axis=0), kept.max(axis=0)])
-
-
-def _common_box(bodies: Sequence[_Body]) -> tuple[np.ndarray, float, float]:
-    """Least and greatest x, y (2, 2) of all bodies with a margin, width and height [mm]."""
-    box = np.array([np.min([b.box[0] for b in bodies], axis=0), np.max([b.box[1] for b in bodies], axis=0)])
-    box += 0.02 * np.ptp(box, axis=0).max() * np.array([[-1], [1]])
-    return box, *np.ptp(box, axis=0).tolist()
 
 
 def _draw(ax: Axes, body: _Body, title: str) -> None:
@@ -184,64 +181,88 @@ def _draw(ax: Axes, body: _Body, title: str) -> None:
     ax.set_title(title)
 
 
-def _panels(axes: Sequence[Axes], bodies: Sequence[_Body], titles: Sequence[str], box: np.ndarray, dim: int) -> None:
+def _panels(axes: Sequence[Axes], bodies: Sequence[_Body], titles: Sequence[str], box: np.ndarray) -> None:
     """Bodies at one scale, with titles and a colour bar."""
     for ax, body, title in zip(axes, bodies, titles):
         _draw(ax, body, title)
         ax.set(xlim=box[:, 0], ylim=box[:, 1], aspect="equal", xlabel="$x$ (mm)", ylabel="$y$ (mm)")
         ax.locator_params(nbins=5)
-        ax.label_outer()
-        if dim == 3:
+        if not len(body.outline):  # a body in space: the axes of the picture are not those of the body
             ax.set_axis_off()
     bar = axes[0].figure.colorbar(ScalarMappable(cmap=GAMMA_MAP), ax=axes, aspect=25, pad=0.02, shrink=0.8)
     bar.set_label(r"relative density $\gamma$")
 
 
+# --- pictures of the density ---
 @matplotlib.rc_context(STYLE)
 def density_picture(space: Space, frames: Sequence[Frame], path: str | Path, title: str = "",
                     view: View = OBLIQUE) -> None:
-    """Relative density on the deformed body, a panel for each frame; cracks (gamma < 0.1) are open."""
-    bodies = [_body(space, frame, view) for frame in frames]
-    box, width, height = _common_box(bodies)
+    """Relative density on the deformed body, a panel for each frame; cracks (gamma < 0.1) stand open."""
+    bodies, box, ratio = _bodies(space, frames, view)
     n = len(frames)
-    grids = {c: min((WIDTH - 1.3) / c - 0.1, ((TALLEST - 0.6) * c / n - 0.3) * width / height)  # width of a panel [in]
-             for c in range(1, n + 1) if n % c == 0}
-    columns = max(c for c, panel in grids.items() if panel > 0.7 * max(grids.values()))
-    figure = Figure((WIDTH, n // columns * (grids[columns] * height / width + 0.3) + 0.6), layout="compressed")
+    panel = {columns: min((WIDTH - 1.3) / columns - 0.1, ((TALLEST - 0.6) * columns / n - 0.3) / ratio)  # width [in]
+             for columns in range(1, n + 1) if n % columns == 0}
+    columns = max(c for c in panel if panel[c] > 0.6 * max(panel.values()))
+    figure = Figure((WIDTH, n // columns * (panel[columns] * ratio + 0.3) + 0.6), layout="compressed")
     axes = figure.subplots(n // columns, columns, squeeze=False).ravel().tolist()
-    _panels(axes, bodies, [frame.title for frame in frames], box, space.dim)
+    _panels(axes, bodies, [frame.title for frame in frames], box)
+    for ax in axes:
+        ax.label_outer()
     _save(figure, path, title)
 
 
 @matplotlib.rc_context(STYLE)
 def animation(space: Space, frames: Sequence[Frame], path: str | Path, seconds: float = 7.0,
               view: View = OBLIQUE) -> None:
-    """Relative density on the deformed body as an endless GIF of about `seconds` and at most `GIF_BYTES`."""
-    bodies = [_body(space, frame, view) for frame in frames]
-    box, width, height = _common_box(bodies)
+    """Relative density on the deformed body as an endless GIF of about `seconds`, of `GIF_FRAMES` at the most."""
+    frames = [frames[i] for i in np.unique(np.linspace(0, len(frames) - 1, min(len(frames), GIF_FRAMES)).astype(int))]
+    last, box, ratio = _bodies(space, frames[::-8], view)
+    scale = 3.6 / max(1, ratio)
+    figure = Figure((scale + 1.3, scale * ratio + 0.75), dpi=120, layout="compressed")
+    canvas, ax = FigureCanvasAgg(figure), figure.subplots()
+    _panels([ax], last[:1], [frames[-1].title], box)
+    canvas.draw()
+    figure.set_layout_engine("none")  # keep this layout for all frames
+    pictures = []
+    for frame in frames:
+        for artist in list(ax.collections):
+            artist.remove()
+        _draw(ax, _body(space, frame, view), frame.title)
+        canvas.draw()
+        pictures.append(Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB"))
+    palette = Image.fromarray(np.concatenate([*map(np.asarray, pictures[::max(1, len(pictures) // 4)])])).quantize(128)
+    images = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
     duration = [max(20, int(1000 * seconds / (len(frames) + 5)))] * len(frames)
     duration[-1] *= 6  # the end stays for a while
-    scale = 3.6 / max(width, height)
-    for dpi in (120, 90, 60, 40):
-        figure = Figure((scale * width + 1.3, scale * height + 0.75), dpi=dpi, layout="compressed")
-        canvas, ax = FigureCanvasAgg(figure), figure.subplots()
-        _panels([ax], bodies[-1:], [frames[-1].title], box, space.dim)
-        canvas.draw()
-        figure.set_layout_engine("none")
-        pictures = []
-        for body, frame in zip(bodies, frames):
-            for artist in list(ax.collections):
-                artist.remove()
-            _draw(ax, body, frame.title)
-            canvas.draw()
-            pictures.append(np.asarray(canvas.buffer_rgba())[:, :, :3].copy())
-        palette = Image.fromarray(np.concatenate(pictures[::max(1, len(pictures) // 4)])).quantize(128)
-        images = [Image.fromarray(p).quantize(palette=palette, dither=Image.Dither.NONE) for p in pictures]
-        file = io.BytesIO()
-        images[0].save(file, "GIF", save_all=True, append_images=images[1:], duration=duration, loop=0)
-        if file.tell() <= GIF_BYTES:
-            break
+    file = io.BytesIO()
+    images[0].save(file, "GIF", save_all=True, append_images=images[1:], duration=duration, loop=0)
     write_atomic(path, file.getvalue())
+
+
+@matplotlib.rc_context(STYLE)
+def comparison_picture(space: Space, dynamic_frame: Frame, quasistatic_frame: Frame, dyn_history: History,
+                       qs_history: History, path: str | Path, title: str = "", view: View = OBLIQUE) -> None:
+    """The dynamic crack beside the quasi-static one, and below them where the energy of both is at the end."""
+    bodies, box, ratio = _bodies(space, (dynamic_frame, quasistatic_frame), view)
+    tall = min(2.9 * ratio, 6.0)
+    figure = Figure((WIDTH, tall + 2.9), layout="constrained")
+    axes = figure.subplot_mosaic([["a", "b"], ["c", "c"]], height_ratios=[tall, 1.9])
+    names = [f"(a) dynamic {dynamic_frame.title}", f"(b) quasi-static {quasistatic_frame.title}"]
+    _panels([axes["a"], axes["b"]], bodies, names, box)
+    axes["b"].set_ylabel("")
+    bars = axes["c"]
+    groups = {"U_paper": "$U$ of\nthe paper", "sink_stored": "$D$, from\nstored energy",
+              "sink_kinetic": "$D$, from\nmotion", "released": "released\nin relaxing", "kinetic": "kinetic,\nleft",
+              "elastic": "elastic,\nleft"}
+    for shift, history, kind, colour in ((-0.2, dyn_history, "dynamic", BLUE), (0.2, qs_history, "quasi-static", SAND)):
+        event, _, _, unit = _event(history)
+        last = [event[name][-1] for name in groups]
+        drawn = bars.bar(np.arange(len(last)) + shift, last, 0.38, label=kind, color=colour, ec="k", linewidth=0.4)
+        bars.bar_label(drawn, fmt="%.3g", fontsize=6, padding=1)
+    bars.set(ylabel=f"energy ({unit})", title="(c) energies at the end", ymargin=0.15)
+    bars.set_xticks(range(len(groups)), list(groups.values()))
+    bars.legend()
+    _save(figure, path, title)
 
 
 # --- curves ---
@@ -262,7 +283,7 @@ def ledger_picture(history: History, path: str | Path, title: str = "") -> None:
     """Where the energy is during the event, stacked so that the top edge is the total; below, what does not add up."""
     event, time, label, unit = _event(history)
     figure = Figure((WIDTH, 4.2), layout="constrained")
-    ax, low = figure.subplots(2, 1, sharex=True, height_ratios=[4, 1])
+    ax, low = figure.subplots(2, 1, sharex=True, height_ratios=[4, 1], subplot_kw={"xmargin": 0})
     total = np.zeros(len(time))
     for name, (meaning, colour) in BANDS.items():
         if np.any(event[name]):
@@ -271,10 +292,8 @@ def ledger_picture(history: History, path: str | Path, title: str = "") -> None:
     ax.plot(time, total, "k", label="total")
     ax.plot(time, event["U_paper"], "k--", label="$U$ of the paper")
     ax.set(ylabel=f"energy ({unit})", ylim=(0, None))
-    ax.margins(x=0)
     figure.legend(*(entry[::-1] for entry in ax.get_legend_handles_labels()), loc="outside right upper")
-    onset = event["elastic"][0] + event["kinetic"][0]
-    error = 100 * event["balance"] / onset
+    error = 100 * event["balance"] / (event["elastic"][0] + event["kinetic"][0])
     limit = max(0.01, 1.2 * np.abs(error).max())
     low.plot(time, error, "k")
     low.set(xlabel=label, ylabel="balance error\n(% of onset)", ylim=(-limit, limit))
@@ -285,59 +304,36 @@ def ledger_picture(history: History, path: str | Path, title: str = "") -> None:
 @matplotlib.rc_context(STYLE)
 def tip_picture(history: History, path: str | Path, title: str, shear_wave_speed: float,
                 rayleigh_wave_speed: float) -> None:
-    """Where the leading tip is, and how fast, beside the wave speeds [m/s] and the number of branches."""
+    """Where the leading tip is, how fast beside the wave speeds [m/s] (if finite), and the number of branches."""
     event, time, label, _ = _event(history)
     figure = Figure((WIDTH / 2 + 0.6, 4.2), layout="constrained")
-    ax, low = figure.subplots(2, 1, sharex=True)
+    ax, low = figure.subplots(2, 1, sharex=True, subplot_kw={"xmargin": 0})
     ax.plot(time, event["crack_length_mm"], "k", label="crack length")
     for name, line in (("x", "-"), ("y", "--"), ("z", ":")):
         if np.isfinite(event[f"tip_{name}_mm"]).any():
             ax.plot(time, event[f"tip_{name}_mm"], line, color=BLUE, label=f"tip, ${name}$")
-    ax.set(ylabel="length, position (mm)")
-    ax.margins(x=0)
+    ax.set_ylabel("length, position (mm)")
     ax.legend()
-    low.plot(time, event["tip_speed_m_per_s"], color=RED)
-    for speed, name, line, align in ((shear_wave_speed, "$c_s$", "-", "bottom"), (rayleigh_wave_speed, "$c_R$", "--", "top")):
-        low.axhline(speed, color="0.3", linewidth=0.8, linestyle=line)
-        low.text(0.99, speed, name, transform=low.get_yaxis_transform(), ha="right", va=align)
-    low.set(xlabel=label, ylim=(0, None))
-    low.set_ylabel("tip speed (m/s)", color=RED)
-    count = low.twinx()
+    low.set_xlabel(label)
+    count = low
+    if np.isfinite(shear_wave_speed):
+        speed = event["tip_speed_m_per_s"]
+        low.plot(time, speed, color=RED)
+        low.axhline(shear_wave_speed, color="0.3", linewidth=0.8, label="$c_s$")
+        low.axhline(rayleigh_wave_speed, color="0.3", linewidth=0.8, linestyle="--", label="$c_R$")
+        low.set_ylim(0, 1.2 * np.nanmax([shear_wave_speed, *speed]))
+        low.set_ylabel("tip speed (m/s)", color=RED)
+        low.legend(loc="upper right", ncols=2)
+        count = low.twinx()
     count.step(time, event["branches"], where="post", color=BLUE)
-    count.set_ylim(0, 3 * max(2, event["branches"].max()))  # in the lower third, clear of the speed
+    count.set(xmargin=0, ylim=(0, 3 * max(2, event["branches"].max())))  # in the lower third, clear of the speed
     count.set_ylabel("branches", color=BLUE)
-    count.yaxis.set_major_locator(MaxNLocator(6, integer=True))
-    _save(figure, path, title)
-
-
-@matplotlib.rc_context(STYLE)
-def comparison_picture(space: Space, dynamic_frame: Frame, quasistatic_frame: Frame, dyn_history: History,
-                       qs_history: History, path: str | Path, title: str = "", view: View = OBLIQUE) -> None:
-    """The dynamic crack beside the quasi-static one, and below them where the energy of both is at the end."""
-    bodies = [_body(space, frame, view) for frame in (dynamic_frame, quasistatic_frame)]
-    box, width, height = _common_box(bodies)
-    tall = min(2.9 * height / width, 6.0)
-    figure = Figure((WIDTH, tall + 3.0), layout="constrained")
-    axes = figure.subplot_mosaic([["a", "b"], ["c", "c"]], height_ratios=[tall, 1.9])
-    names = [": ".join(filter(None, [kind, frame.title])) for kind, frame in
-             (("(a) dynamic", dynamic_frame), ("(b) quasi-static", quasistatic_frame))]
-    _panels([axes["a"], axes["b"]], bodies, names, box, space.dim)
-    groups = {"U_paper": "$U$ of\nthe paper", "sink_stored": "$D$, from\nstored energy", "elastic": "elastic,\nleft",
-              "sink_kinetic": "$D$, from\nmotion", "kinetic": "kinetic,\nleft", "released": "released\nin relaxing"}
-    for shift, history, kind, colour in ((-0.2, dyn_history, "dynamic", BLUE), (0.2, qs_history, "quasi-static", SAND)):
-        event, _, _, unit = _event(history)
-        bars = axes["c"].bar(np.arange(len(groups)) + shift, [event[name][-1] for name in groups], 0.38, label=kind,
-                             color=colour, edgecolor="k", linewidth=0.4)
-        axes["c"].bar_label(bars, fmt="%.3g", fontsize=6, padding=1)
-    axes["c"].set(ylabel=f"energy ({unit})", title="(c) energies at the end")
-    axes["c"].set_xticks(range(len(groups)), list(groups.values()))
-    axes["c"].margins(y=0.15)
-    axes["c"].legend()
+    count.locator_params(axis="y", nbins=6, integer=True)
     _save(figure, path, title)
 
 
 def _save(figure: Figure, path: str | Path, title: str) -> None:
-    figure.suptitle(title or None)
+    figure.suptitle(title)
     kind = Path(path).suffix.lstrip(".") or "png"
     with replaced(path) as part:
         figure.savefig(part, format=kind, dpi=DPI, metadata={"CreationDate": None} if kind == "pdf" else None)

@@ -82,6 +82,8 @@ class Statics:
         # a body that has come apart bears no force; this says what counts as none
         size = float(self.space.V.sum()) ** (1 - 1 / self.space.dim)
         self._least_force = 1e-3 * momentum.material.shear_modulus * size
+        # rounding of the stored energy: I1' - 3 is a difference of numbers of order one
+        self._noise = 1e-14 * momentum.material.shear_modulus * float(self.space.V.sum())
         self.newton_steps = 0
         self.settled = False      #: whether the last sweep of `propagate` found nothing left to change
         self.increment = 0.0      #: current load increment, as load time [s]; 0 before the first
@@ -129,7 +131,7 @@ class Statics:
             while True:
                 trial = momentum.force(u + length * step)
                 fits = momentum.least_J >= lowest and np.isfinite(momentum.energy)
-                if fits and momentum.energy <= energy + 1e-4 * length * slope + 1e-13 * abs(energy):
+                if fits and momentum.energy <= energy + 1e-4 * length * slope + self._noise:
                     break
                 length *= 0.5
                 self._stale = True
