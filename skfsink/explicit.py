@@ -77,7 +77,7 @@ def highest_frequency(momentum: Momentum, pattern: Pattern, free: np.ndarray, u:
         indptr, indices, data, scale * np.ascontiguousarray(x).ravel()))
     if start is None:
         start = np.sin(1.0 + np.arange(pattern.size) * 2.399963)  # no symmetry, the same every time
-    value, vector = sla.eigsh(operator, k=1, which="LA", v0=start, tol=tolerance, ncv=min(24, pattern.size - 1))
+    value, vector = sla.eigsh(operator, k=1, which="LA", v0=start, tol=tolerance, ncv=min(12, pattern.size - 1))
     return float(np.sqrt(max(value[0], 0.0))), vector[:, 0]
 
 
@@ -228,7 +228,7 @@ class Explicit:
         self.dt = c.courant * 2.0 / (self._omega * np.sqrt(max(1.0, ratio)))
 
     def _indicator(self, u: np.ndarray) -> float:
-        """Greatest volumetric stiffness to mass ratio of one element, gamma_bar k |b|^2_(1/m)/V: follows omega_max^2."""
+        """Greatest volumetric stiffness of an element over its mass, gamma_bar k |b|^2_(1/m)/V: follows omega_max^2."""
         g = self.momentum.space.element_mean(self.momentum.gamma)
         return float(_volumetric_ratio(self.space.conn, self.space.X + u, self.space.dN, self.space.w, g, self.mass)
                      * self.momentum.material.bulk_modulus)
@@ -237,17 +237,16 @@ class Explicit:
     def memory(self) -> dict[str, np.ndarray]:
         """What the integrator remembers beyond the state, for a checkpoint."""
         assert self._mode is not None
-        return {"mode": self._mode, "scalars": np.array([self.dt, self._omega, self._indicator0,
-                                                         self._last_estimate, self.estimates, self._elastic, self._urgent,
-                                                         self._since_gamma]),
-                "reaction": self.reaction}
+        scalars = [self.dt, self._omega, self._indicator0, self._last_estimate, self.estimates, self._elastic,
+                   self._urgent, self._since_gamma]
+        return {"mode": self._mode, "scalars": np.array(scalars, float), "reaction": self.reaction}
 
     def restore(self, state: State, memory: dict[str, np.ndarray]) -> None:
         """Go on exactly where :meth:`memory` was taken."""
         self.start(state)
         self._mode = memory["mode"]
         scalars = [float(value) for value in memory["scalars"]]
-        self.dt, self._omega, self._indicator0, self._elastic = scalars[0], scalars[1], scalars[2], scalars[5]
+        self.dt, self._omega, self._indicator0, self._elastic = *scalars[:3], scalars[5]
         self._last_estimate, self.estimates = int(scalars[3]), int(scalars[4])
         self._urgent, self._since_gamma = bool(scalars[6]), int(scalars[7])
         self.reaction = memory["reaction"]

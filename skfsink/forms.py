@@ -46,7 +46,7 @@ class DensityForms:
 
 
 def element_mean(values: Any, dV: Any) -> np.ndarray:
-    """Projection of Gauss point values (..., ne, nq) on the element constants, spread over the Gauss points (Eq. 13)."""
+    """Projection of Gauss point values (..., ne, nq) on the element constants, at every Gauss point (Eq. 13)."""
     mean = np.sum(values * dV, axis=-1, keepdims=True) / np.sum(np.asarray(dV), axis=-1, keepdims=True)
     return np.broadcast_to(mean, np.broadcast(values, dV).shape)
 

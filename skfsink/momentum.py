@@ -59,7 +59,8 @@ class Momentum:
         """Internal force at the displacement `u`, (n, dim) [N; N/mm in 2D]. Sets `energy`, `least_J` and `W`."""
         out = np.empty_like(self.space.X) if out is None else out
         m = self.material
-        self.least_J = self.tiles.force(self.space.X + u, m.law, self._constants, m.bulk_modulus, out, self.j_bar)
+        self.least_J = self.tiles.force(self.space.X + u, m.compiled_law, self._constants, m.bulk_modulus, out,
+                                        self.j_bar)
         self.energy = float(self.tiles.psi.sum())
         self.evaluations += 1
         return out

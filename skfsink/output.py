@@ -214,9 +214,10 @@ class Series:
         return self.folder / f"{self.name}_{number:04d}.vtu"
 
     def add(self, time: float, point_data: Mapping[str, np.ndarray], cell_data: Mapping[str, np.ndarray]) -> None:
-        """Write a frame of (n,) or (n, dim) arrays on points and (ne,) or (ne, dim) on cells, then name it in the PVD file.
+        """Write a frame, then name it in the PVD file.
 
-        Vectors get a third component; floats are stored in single precision, flags as bytes.
+        Arrays are (n,) or (n, dim) on points, (ne,) or (ne, dim) on cells. Vectors get a third component; floats are
+        stored in single precision, flags as bytes.
         """
         points = {name: _field(values) for name, values in point_data.items()}
         cells = {name: [_field(values)] for name, values in cell_data.items()}

@@ -124,9 +124,8 @@ class Statics:
                 diagonal = np.abs(momentum.tangent(self.pattern, u)[self.pattern.diagonal])
                 d = -r / np.maximum(diagonal, 1e-12 * diagonal.max())
                 slope = float(r @ d)
-            step = np.zeros(u.size)
-            step[self.free] = d
-            step = step.reshape(u.shape)
+            step = np.zeros(u.shape)
+            step.reshape(-1)[self.free] = d
             length = 1.0
             while True:
                 trial = momentum.force(u + length * step)

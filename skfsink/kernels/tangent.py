@@ -37,8 +37,8 @@ def tangent(space: Space, pattern: Pattern, material: Material, u: np.ndarray, g
     """Data of the tangent on `pattern` at the displacement `u` (n, dim) and Gauss point densities `gamma` (ne, nq)."""
     data = np.zeros(pattern.nnz)
     loop = _tangent_2d if space.dim == 2 else _tangent_3d
-    loop(material.law, material.constants, material.bulk_modulus, material.shear_modulus, space.conn, space.X + u,
-         space.dN, space.w, np.ascontiguousarray(gamma), j_bar, pattern.slot, data)
+    loop(material.compiled_law, material.constants, material.bulk_modulus, material.shear_modulus, space.conn,
+         space.X + u, space.dN, space.w, np.ascontiguousarray(gamma), j_bar, pattern.slot, data)
     return data
 
 

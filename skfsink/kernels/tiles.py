@@ -15,6 +15,7 @@ from collections.abc import Callable
 import numpy as np
 from numba import njit
 
+from ..material import CompiledLaw
 from ..space import Space
 from .force2d import force_2d
 from .force3d import force_3d
@@ -69,7 +70,7 @@ class Tiles:
         used = self.space.n_elements - (self.count - 1) * self.lanes
         self.gamma[-1, :, used:] = 0.0
 
-    def force(self, x: np.ndarray, law: Callable[..., None], constants: np.ndarray, bulk_modulus: float,
+    def force(self, x: np.ndarray, law: CompiledLaw, constants: np.ndarray, bulk_modulus: float,
               out: np.ndarray, j_bar: bool = True) -> float:
         """Internal force (Eq. 17) at the positions `x` (n, dim) [mm] into `out` (n, dim) [N, or N/mm in 2D].
 
