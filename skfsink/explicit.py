@@ -75,9 +75,11 @@ def highest_frequency(momentum: Momentum, pattern: Pattern, free: np.ndarray, u:
     indptr, indices = pattern.indptr.view(np.uint32), pattern.indices.view(np.uint32)
     operator = sla.LinearOperator((pattern.size,) * 2, dtype=float, matvec=lambda x: scale * symmetric_product(
         indptr, indices, data, scale * np.ascontiguousarray(x).ravel()))
-    if start is None:
-        start = np.sin(1.0 + np.arange(pattern.size) * 2.399963)  # no symmetry, the same every time
-    value, vector = sla.eigsh(operator, k=1, which="LA", v0=start, tol=tolerance, ncv=min(12, pattern.size - 1))
+    # The highest mode sits in one element, and the next one may sit in another, where the last result is zero: add
+    # a vector that reaches everywhere, has no symmetry, and is the same every time.
+    everywhere = np.sin(1.0 + np.arange(pattern.size) * 2.399963) * np.sqrt(2.0 / pattern.size)
+    start = everywhere if start is None else everywhere + start
+    value, vector = sla.eigsh(operator, k=1, which="LA", v0=start, tol=tolerance, ncv=min(16, pattern.size - 1))
     return float(np.sqrt(max(value[0], 0.0))), vector[:, 0]
 
 
@@ -98,6 +100,7 @@ class Explicit:
     """
 
     GAMMA_INTERVAL = 0.03  # l/c_s between solves for gamma; the crack then runs less than 3 % of l
+    GAMMA_MOST = 20  # steps between them at the most, lest a failing element that shortens the step keeps failing
     CHECK = 5        # steps between looks at the cheap indicator
     FED_IN = 1e-6    # energy a step may feed in before omega_max is estimated at once, of the initial energy
 
@@ -211,7 +214,7 @@ class Explicit:
         if self.controls.gamma_every:
             return self.controls.gamma_every
         transit = self.density.law.length_scale / (self.momentum.material.shear_wave_speed * 1e3)
-        return max(1, int(self.GAMMA_INTERVAL * transit / self.dt))
+        return min(max(1, int(self.GAMMA_INTERVAL * transit / self.dt)), self.GAMMA_MOST)
 
     # --- the step size ---
     def _set_step(self, state: State) -> None:
@@ -222,13 +225,17 @@ class Explicit:
         if self._mode is None or self._urgent or due or abs(ratio - 1) > 2 * c.estimate_change:
             self._omega, self._mode = highest_frequency(self.momentum, self._pattern, self.free, state.u, self.mass,
                                                         self._mode)
+            self._omega = max(self._omega, indicator**0.5)  # a Rayleigh quotient, in case Lanczos missed that element
             self._indicator0, self._last_estimate, ratio = indicator, state.step, 1.0
             self.estimates += 1
             self._urgent = False
         self.dt = c.courant * 2.0 / (self._omega * np.sqrt(max(1.0, ratio)))
 
     def _indicator(self, u: np.ndarray) -> float:
-        """Greatest volumetric stiffness of an element over its mass, gamma_bar k |b|^2_(1/m)/V: follows omega_max^2."""
+        """Greatest volumetric stiffness of an element over its mass, gamma_bar k |b|^2_(1/m)/V.
+
+        It is the Rayleigh quotient of M^-1 b, so a lower bound of omega_max^2, and follows it closely.
+        """
         g = self.momentum.space.element_mean(self.momentum.gamma)
         return float(_volumetric_ratio(self.space.conn, self.space.X + u, self.space.dN, self.space.w, g, self.mass)
                      * self.momentum.material.bulk_modulus)

@@ -256,7 +256,8 @@ def comparison_picture(space: Space, dynamic_frame: Frame, quasistatic_frame: Fr
               "elastic": "elastic,\nleft"}
     for shift, history, kind, colour in ((-0.2, dyn_history, "dynamic", BLUE), (0.2, qs_history, "quasi-static", SAND)):
         event, _, _, unit = _event(history)
-        last = [event[name][-1] for name in groups]
+        last = np.array([event[name][-1] for name in groups])
+        last[np.abs(last) < 1e-4 * np.abs(last).max()] = 0.0
         drawn = bars.bar(np.arange(len(last)) + shift, last, 0.38, label=kind, color=colour, ec="k", linewidth=0.4)
         bars.bar_label(drawn, fmt="%.3g", fontsize=6, padding=1)
     bars.set(ylabel=f"energy ({unit})", title="(c) energies at the end", ymargin=0.15)
