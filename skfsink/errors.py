@@ -41,8 +41,8 @@ class InstabilityError(SkfsinkError):
 
 
 def require(name: str, value: float, unit: str = "", *, low: float = -math.inf, high: float = math.inf,
-            low_open: bool = False, high_open: bool = False) -> float:
-    """Return `value` as a float if it is a finite number in the interval asked for.
+            low_open: bool = False, high_open: bool = False, whole: bool = False) -> float:
+    """Return `value` as a float if it is a finite number, or a `whole` one, in the interval asked for.
 
     Raises
     ------
@@ -51,13 +51,14 @@ def require(name: str, value: float, unit: str = "", *, low: float = -math.inf, 
     """
     left = ("(" if low_open or low == -math.inf else "[") + f"{low:g}"
     right = f"{high:g}" + (")" if high_open or high == math.inf else "]")
-    allowed = f"{name} must be a finite number in {left}, {right}" + (f" {unit}" if unit else "")
+    kind = "whole" if whole else "finite"
+    allowed = f"{name} must be a {kind} number in {left}, {right}" + (f" {unit}" if unit else "")
     try:
-        number = float(value)
-    except (TypeError, ValueError):
-        raise ParameterError(f"{allowed}; got {value!r}") from None
+        number = math.nan if isinstance(value, str) else float(value)
+    except (TypeError, ValueError, OverflowError):
+        number = math.nan
     too_low = number <= low if low_open else number < low
     too_high = number >= high if high_open else number > high
-    if not math.isfinite(number) or too_low or too_high:
+    if not math.isfinite(number) or too_low or too_high or (whole and number % 1):
         raise ParameterError(f"{allowed}; got {value!r}")
     return number

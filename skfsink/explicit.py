@@ -56,9 +56,9 @@ class ExplicitControls:
 
     def __post_init__(self) -> None:
         require("courant", self.courant, low=0, high=1, low_open=True)
-        require("gamma-every", self.gamma_every, "steps", low=0)
+        require("gamma-every", self.gamma_every, "steps", low=0, whole=True)
         require("mass-floor", self.mass_floor, low=0, high=1, high_open=True)
-        require("estimate-every", self.estimate_every, "steps", low=1)
+        require("estimate-every", self.estimate_every, "steps", low=1, whole=True)
         require("estimate-change", self.estimate_change, low=0, high=1, low_open=True, high_open=True)
 
 

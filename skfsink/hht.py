@@ -72,7 +72,7 @@ class HHTControls:
         require("force-tolerance", self.force_tolerance, low=0, high=0.1, low_open=True)
         require("correction-tolerance", self.correction_tolerance, low=0, high=0.1, low_open=True)
         require("gamma-tolerance", self.gamma_tolerance, low=0, high=0.1, low_open=True)
-        require("max-iterations", self.max_iterations, low=3)
+        require("max-iterations", self.max_iterations, low=3, whole=True)
         if self.coupling not in COUPLINGS:
             raise ParameterError(f"coupling must be one of {', '.join(COUPLINGS)}; got {self.coupling!r}")
         if self.mass not in MASSES:

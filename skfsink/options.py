@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any
 
-from cyclopts import Parameter
+from cyclopts import Group, Parameter, Token
 
 from .errors import require
 from .explicit import ExplicitControls
@@ -14,9 +15,28 @@ from .hht import HHTControls
 from .material import AAA, SinkLaw
 from .scene import Controls
 
-__all__ = ["Options"]
+__all__ = ["GEOMETRY", "Options"]
 
-NOT_PHYSICS = ("out", "resume", "overwrite", "quiet")  # say where a run goes, not what it is
+NOT_PHYSICS = ("out", "resume", "overwrite", "quiet", "given")  # say where a run goes, not what it is
+
+
+def _number(kind: type, tokens: Sequence[Token]) -> Any:
+    """The number in the text, or the text itself: :func:`require` then says which numbers are allowed."""
+    try:
+        return kind(tokens[0].value)
+    except ValueError:
+        return tokens[0].value
+
+
+def _group(name: str) -> Parameter:
+    """Options that `--help` shows together."""
+    return Parameter(group=Group.create_ordered(name), converter=_number)
+
+
+GEOMETRY, MATERIAL, SINK, LOADING, ANALYSIS, EXPLICIT, HHT, CONTROLS, OUTPUT = (
+    _group(name) for name in ("Geometry", "Material", "Sink", "Loading", "Analysis", "Explicit integrator",
+                              "HHT integrator", "Controls", "Output"))
+FLAG = Parameter(negative="", show_default=False)
 
 
 @Parameter(name="*")
@@ -94,39 +114,40 @@ class Options:
         Show no progress.
     """
 
-    speed: float = 1e-3
-    c1: float = 0.617
-    c2: float = 1.215
-    bulk_modulus: float = 500.0
-    phi: float = 0.1686
-    m: Annotated[float, Parameter(name=["--m"])] = 10.0
-    length_scale: float = 0.1
-    density: float = 1433.0
-    analysis: str = "dynamic"
-    integrator: str = "explicit"
-    hht_alpha: float = -0.05
-    hht_dt: float = 1.6e-7
-    coupling: str = "iterated"
-    mass: str = "lumped"
-    courant: float = 0.8
-    gamma_every: int = 0
-    sink: str = "lumped"
-    element: str = "jbar"
-    overshoot: float = 0.005
-    force_floor: float = 1e-3
-    mass_floor: float = 1e-3
-    deletion: float = 1e-6
-    event_time: float = 2e-4
-    aftermath: float = 1e-5
-    record_every: float = 1e-6
-    frame_every: float = 5e-6
-    balance_tolerance: float = 0.05
-    checkpoint_every: float = 20.0
-    threads: int = 1
-    out: Path | None = None
-    resume: Path | None = None
-    overwrite: Annotated[bool, Parameter(negative="")] = False
-    quiet: Annotated[bool, Parameter(negative="")] = False
+    c1: Annotated[float, MATERIAL] = 0.617
+    c2: Annotated[float, MATERIAL] = 1.215
+    bulk_modulus: Annotated[float, MATERIAL] = 500.0
+    density: Annotated[float, MATERIAL] = 1433.0
+    phi: Annotated[float, SINK] = 0.1686
+    m: Annotated[float, SINK, Parameter(name=["--m"])] = 10.0
+    length_scale: Annotated[float, SINK] = 0.1
+    sink: Annotated[str, SINK] = "lumped"
+    deletion: Annotated[float, SINK] = 1e-6
+    force_floor: Annotated[float, SINK] = 1e-3
+    speed: Annotated[float, LOADING] = 1e-3
+    overshoot: Annotated[float, LOADING] = 0.005
+    analysis: Annotated[str, ANALYSIS] = "dynamic"
+    integrator: Annotated[str, ANALYSIS] = "explicit"
+    element: Annotated[str, ANALYSIS] = "jbar"
+    event_time: Annotated[float, ANALYSIS] = 2e-4
+    aftermath: Annotated[float, ANALYSIS] = 1e-5
+    courant: Annotated[float, EXPLICIT] = 0.8
+    gamma_every: Annotated[int, EXPLICIT] = 0
+    mass_floor: Annotated[float, EXPLICIT] = 1e-3
+    hht_alpha: Annotated[float, HHT] = -0.05
+    hht_dt: Annotated[float, HHT] = 1.6e-7
+    coupling: Annotated[str, HHT] = "iterated"
+    mass: Annotated[str, HHT] = "lumped"
+    balance_tolerance: Annotated[float, CONTROLS] = 0.05
+    checkpoint_every: Annotated[float, CONTROLS] = 20.0
+    threads: Annotated[int, CONTROLS] = 1
+    record_every: Annotated[float, OUTPUT] = 1e-6
+    frame_every: Annotated[float, OUTPUT] = 5e-6
+    out: Annotated[Path | None, OUTPUT] = None
+    resume: Annotated[Path | None, OUTPUT] = None
+    overwrite: Annotated[bool, OUTPUT, FLAG] = False
+    quiet: Annotated[bool, OUTPUT, FLAG] = False
+    given: Annotated[frozenset[str], Parameter(parse=False)] = frozenset()
 
     def __post_init__(self) -> None:
         require("speed", self.speed, "mm/s", low=0, low_open=True)

@@ -64,7 +64,7 @@ class Display:
 
     def say(self, text: str) -> None:
         """A line above the progress."""
-        self.console.print(text, highlight=False, soft_wrap=True)
+        self.console.print(text, highlight=False, markup=False, soft_wrap=True)
 
 
 class Interrupt:

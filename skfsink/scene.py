@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -94,7 +94,7 @@ class Controls:
             require(name.replace("_", "-"), getattr(self, name), "s", low=0, low_open=True)
         require("aftermath", self.aftermath, "s", low=0)
         require("balance-tolerance", self.balance_tolerance, low=0, high=1, low_open=True)
-        require("threads", self.threads, low=1, high=256)
+        require("threads", self.threads, low=1, high=256, whole=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,6 +111,11 @@ class Scene:
     notch: boundaries that are no free edges although nothing holds them.
     controls: how it is computed.
     assumed: statements about lengths that the paper does not print.
+
+    Raises
+    ------
+    MeshError
+        The mesh lacks the boundary of a grip or of the notch.
     """
 
     case: str
@@ -123,6 +128,15 @@ class Scene:
     notch: tuple[str, ...] = ()
     controls: Controls = field(default_factory=Controls)
     assumed: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for boundary in (*(grip.boundary for grip in self.grips), *self.notch):
+            self.sample.nodes(boundary)
+
+    def part(self, analysis: str) -> Scene:
+        """This scene in one of the two analyses."""
+        return replace(self, parameters={**self.parameters, "analysis": analysis},
+                       controls=replace(self.controls, analysis=analysis))
 
     def constraints(self) -> tuple[np.ndarray, np.ndarray]:
         """Mask of the free degrees of freedom (n*dim,) and velocity of the held ones (n, dim) [mm/s]."""
@@ -152,8 +166,11 @@ class Scene:
 
     @property
     def fingerprint(self) -> str:
-        """Hash of all that decides the results of the run."""
-        return hashlib.sha256(self.toml().encode()).hexdigest()
+        """Hash of all that decides the results of the run: the parameters and the mesh."""
+        hashed, space = hashlib.sha256(self.toml().encode()), self.sample.space
+        for array in (space.X, space.conn, *(nodes for _, nodes in sorted(self.sample.boundaries.items()))):
+            hashed.update(np.ascontiguousarray(array))
+        return hashed.hexdigest()
 
 
 def read_parameters(folder: Path, case: str) -> dict[str, Any]:

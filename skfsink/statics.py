@@ -50,8 +50,8 @@ class StaticsControls:
         require("gamma-tolerance", self.gamma_tolerance, low=0, high=0.01, low_open=True)
         require("increment", self.increment, low=0, high=0.5, low_open=True)
         require("onset-tolerance", self.onset_tolerance, low=0, high=0.1, low_open=True)
-        require("max-newton", self.max_newton, low=3)
-        require("max-passes", self.max_passes, low=3)
+        require("max-newton", self.max_newton, low=3, whole=True)
+        require("max-passes", self.max_passes, low=3, whole=True)
 
 
 class Statics:
@@ -218,11 +218,10 @@ class Statics:
             before = self.momentum.effective(state.gamma, state.deleted)
             ledger.drop(self.space.w, 0.5 * (W + W_new), before, self.momentum.gamma)
             state.u, state.gamma, state.W_max = u, gamma, W_max
-            force, W = new_force, W_new
+            force, W = self.momentum.force(state.u), W_new  # at the settled gamma, as after a resume
             state.grip += self.increment
             state.time = state.grip
             state.step += 1
-            self.momentum.force(state.u)
             ledger.elastic = self.momentum.energy
             yield state
 

@@ -10,7 +10,7 @@ import pytest
 from bodies import grid, notched
 from PIL import Image
 
-from skfsink import plot
+from skfsink import deformed, plot
 from skfsink.output import HISTORY_COLUMNS
 from skfsink.plot import Frame, animation, comparison_picture, density_picture, ledger_picture, tip_picture
 from skfsink.space import Space
@@ -40,7 +40,7 @@ def cracked(space: Space, tip: float, wild: float = 0.0, time: float = 2e-5) -> 
     gamma = np.maximum(1 - np.exp(-distance / 0.1), 1e-15)
     u = np.zeros_like(space.X)
     u[:, 1] = 0.05 * np.sign(y) * np.clip(tip - x, 0, 1)
-    spent = gamma < plot.SPENT
+    spent = gamma < deformed.SPENT
     u[spent] += wild * np.random.default_rng(0).normal(size=(spent.sum(), 2))
     return Frame(time, "", u, gamma, (gamma[space.conn] < 1e-6).all(axis=1))
 
@@ -77,8 +77,8 @@ def on_plate(x: np.ndarray) -> bool:
 # --- what is drawn ---
 def test_dead_elements_are_not_drawn(plate: Space) -> None:
     frame = cracked(plate, 3.0)
-    elements, x = plot.live_elements(plate, frame)
-    dead = frame.deleted | (frame.gamma[plate.conn] < plot.SPENT).all(axis=1)
+    elements, x = deformed.live_elements(plate, frame)
+    dead = frame.deleted | (frame.gamma[plate.conn] < deformed.SPENT).all(axis=1)
     assert dead.sum() > 40
     np.testing.assert_array_equal(elements, np.flatnonzero(~dead))
     assert x.shape == (len(elements), 4, 2)
@@ -86,13 +86,13 @@ def test_dead_elements_are_not_drawn(plate: Space) -> None:
 
 def test_deleted_elements_are_not_drawn_whatever_their_density(plate: Space) -> None:
     frame = Frame(0.0, "", np.zeros_like(plate.X), np.ones(plate.n_nodes), np.arange(plate.n_elements) % 7 == 0)
-    np.testing.assert_array_equal(plot.live_elements(plate, frame)[0], np.flatnonzero(~frame.deleted))
+    np.testing.assert_array_equal(deformed.live_elements(plate, frame)[0], np.flatnonzero(~frame.deleted))
 
 
 def test_spent_nodes_move_with_their_element(plate: Space) -> None:
     calm, wild = cracked(plate, 3.0), cracked(plate, 3.0, wild=1e3)
-    elements, x = plot.live_elements(plate, calm)
-    again, y = plot.live_elements(plate, wild)
+    elements, x = deformed.live_elements(plate, calm)
+    again, y = deformed.live_elements(plate, wild)
     np.testing.assert_array_equal(elements, again)
     np.testing.assert_array_equal(x, y)
     assert on_plate(x)
@@ -107,7 +107,8 @@ def test_the_picture_does_not_show_where_spent_nodes_are(plate: Space, tmp_path:
 def test_torn_elements_are_not_drawn(plate: Space) -> None:
     u = np.zeros_like(plate.X)
     u[plate.conn[100, 0]] = [7.0, 0.0]  # a live node far away
-    elements, x = plot.live_elements(plate, Frame(0.0, "", u, np.ones(plate.n_nodes), np.zeros(plate.n_elements, bool)))
+    frame = Frame(0.0, "", u, np.ones(plate.n_nodes), np.zeros(plate.n_elements, bool))
+    elements, x = deformed.live_elements(plate, frame)
     torn = (plate.conn == plate.conn[100, 0]).any(axis=1)
     np.testing.assert_array_equal(elements, np.flatnonzero(~torn))
     assert on_plate(x)
@@ -117,7 +118,7 @@ def test_the_body_ends_where_gamma_falls_below_a_tenth() -> None:
     space = Space(grid("quad", (7, 5)))
     still = np.zeros_like(space.X), np.zeros(space.n_elements, bool)
     for gamma, share in ((space.X[:, 0], 0.9), (1.0 - space.X[:, 1], 0.9), (space.X.sum(axis=1), 0.995)):
-        (body,), _, ratio = plot._bodies(space, [Frame(0.0, "", still[0], gamma, still[1])], plot.OBLIQUE)
+        (body,), _, ratio = deformed.bodies(space, [Frame(0.0, "", still[0], gamma, still[1])], deformed.OBLIQUE)
         assert area(body.triangles).min() > -1e-12
         assert area(body.triangles).sum() == pytest.approx(share, rel=1e-12)
         assert body.triangles[:, :, 2].min() == pytest.approx(0.1)
@@ -129,7 +130,7 @@ def test_fragments_do_not_widen_the_axes(plate: Space) -> None:
     here = np.abs(plate.X - [3.0, 3.0]).max(axis=1)
     gamma[(here > 0.15) & (here < 0.35)] = 1e-15  # a ring around a fragment
     u[here < 0.15] = [50.0, 0.0]
-    _, box, _ = plot._bodies(plate, [Frame(0.0, "", u, gamma, np.zeros(plate.n_elements, bool))], plot.OBLIQUE)
+    _, box, _ = deformed.bodies(plate, [Frame(0.0, "", u, gamma, np.zeros(plate.n_elements, bool))], deformed.OBLIQUE)
     np.testing.assert_allclose(box, [[-0.08, -0.08], [4.08, 4.08]])
 
 
@@ -138,14 +139,14 @@ def test_a_block_shows_the_faces_towards_the_observer() -> None:
     gamma, u = np.ones(space.n_nodes), np.zeros_like(space.X)
     deleted = np.zeros(space.n_elements, bool)
     for view, share in (((-90.0, 90.0), 2.0), ((-90.0, 0.0), 3.0), ((0.0, 0.0), 6.0), ((45.0, 0.0), 9 / np.sqrt(2))):
-        (body,), _, _ = plot._bodies(space, [Frame(0.0, "", u, gamma, deleted)], view)
+        (body,), _, _ = deformed.bodies(space, [Frame(0.0, "", u, gamma, deleted)], view)
         assert area(body.triangles).min() > -1e-12
         assert area(body.triangles).sum() == pytest.approx(share)
-    (body,), box, _ = plot._bodies(space, [Frame(0.0, "", u, gamma, deleted)], (-90.0, 90.0))
+    (body,), box, _ = deformed.bodies(space, [Frame(0.0, "", u, gamma, deleted)], (-90.0, 90.0))
     np.testing.assert_allclose(box, [[-0.04, -0.04], [1.04, 2.04]], atol=1e-12)  # x to the right, y up
     deleted[space.X[space.conn][:, :, 2].max(axis=1) > 2.9] = True
     deleted[:6] = True
-    (body,), _, _ = plot._bodies(space, [Frame(0.0, "", u, gamma, deleted)], (-90.0, 90.0))
+    (body,), _, _ = deformed.bodies(space, [Frame(0.0, "", u, gamma, deleted)], (-90.0, 90.0))
     assert area(body.triangles).sum() == pytest.approx(2.0)  # the layer below shows
 
 

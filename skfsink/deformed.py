@@ -1,0 +1,135 @@
+"""The deformed body as it is drawn: live elements, cut open along the crack, seen from a direction."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
+
+from .crack import CRACKED
+from .space import Space
+
+__all__ = ["OBLIQUE", "SPENT", "Body", "Frame", "View", "bodies", "body", "live_elements"]
+
+View = tuple[float, float]          # azimuth and elevation [degrees] from which a body in space is seen
+OBLIQUE = (-75.0, 60.0)
+SPENT = 1e-2        # nodes with a lower gamma carry nothing, and their displacement has no meaning
+LONGEST = 3.0       # stretch of an edge beyond which an element is torn
+LEAST_PIECE = 0.02  # of the body; smaller fragments do not widen the axes
+
+# nodes of an element are numbered lexicographically (see `space`); facets go round as seen from outside
+_FACETS = {2: np.array([[0, 1], [1, 3], [3, 2], [2, 0]]),
+           3: np.array([[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]])}
+_LIGHT = np.array([-0.3, 0.4, 0.87])  # towards the light: right, up, out of the picture
+
+
+@dataclass(frozen=True)
+class Frame:
+    """The fields at one time.
+
+    Attributes
+    ----------
+    time: [s]; NaN where time means nothing.   label: what happens then; may be empty.
+    u: displacement [mm], (n, dim).   gamma: relative density, (n,).   deleted: failed elements, (ne,) bool.
+    """
+
+    time: float
+    label: str
+    u: np.ndarray
+    gamma: np.ndarray
+    deleted: np.ndarray
+
+    @property
+    def title(self) -> str:
+        """Label and time in microseconds."""
+        return ", ".join(filter(None, [self.label, f"{self.time * 1e6:.1f} µs" if np.isfinite(self.time) else ""]))
+
+
+class Body(NamedTuple):
+    """A frame as it is drawn."""
+
+    triangles: np.ndarray  # from back to front: x, y [mm], gamma and brightness of their corners, (nt, 3, 4)
+    outline: np.ndarray    # lines along the edge of a plane body [mm], (lines, 2, 2)
+    box: np.ndarray        # least and greatest x, y [mm], (2, 2)
+
+
+def live_elements(space: Space, frame: Frame) -> tuple[np.ndarray, np.ndarray]:
+    """Elements to draw (nl,), and their corners on the deformed body [mm], (nl, na, dim).
+
+    Left out are elements that are deleted, spent at every node, or torn apart. A spent node flies as it likes: each
+    element has it move with the nodes that are not spent, so that the lips of a crack part cleanly.
+    """
+    holds = frame.gamma[space.conn] >= SPENT
+    elements = np.flatnonzero(~frame.deleted & holds.any(axis=1))
+    X, u, holds = space.X[space.conn[elements]], frame.u[space.conn[elements]], holds[elements][:, :, None]
+    x = X + np.where(holds, u, np.sum(u, axis=1, where=holds, keepdims=True) / holds.sum(axis=1, keepdims=True))
+    pairs = [(a, a | 1 << i) for i in range(space.dim) for a in range(2**space.dim) if not a >> i & 1]
+    stretch = [np.linalg.norm(x[:, a] - x[:, b], axis=1) / np.linalg.norm(X[:, a] - X[:, b], axis=1) for a, b in pairs]
+    whole = np.max(stretch, axis=0) < LONGEST
+    return elements[whole], x[whole]
+
+
+def bodies(space: Space, frames: Sequence[Frame], view: View) -> tuple[list[Body], np.ndarray, float]:
+    """What to draw of the frames, the limits of the axes [mm] with a margin, (2, 2), and their height over width."""
+    drawn = [body(space, frame, view) for frame in frames]
+    box = np.array([np.min([b.box[0] for b in drawn], axis=0), np.max([b.box[1] for b in drawn], axis=0)])
+    box += 0.02 * np.ptp(box, axis=0).max() * np.array([[-1], [1]])
+    width, height = box[1] - box[0]
+    return drawn, box, float(height / width)
+
+
+def body(space: Space, frame: Frame, view: View) -> Body:
+    elements, x = live_elements(space, frame)
+    gamma, facets = frame.gamma[space.conn[elements]], _FACETS[space.dim]
+    if space.dim == 2:
+        edge = _outer(space, np.arange(space.n_elements))[elements] & (gamma[:, facets].min(axis=2) >= CRACKED)
+        faces = np.dstack([x, gamma, np.ones_like(gamma)])[:, [0, 1, 3, 2]]
+        return Body(_triangles(faces), x[:, facets][edge], _box(space, elements, x, gamma))
+    (ca, ce), (sa, se) = np.cos(np.radians(view)), np.sin(np.radians(view))
+    x = x @ np.array([[-sa, ca, 0], [-ca * se, -sa * se, ce], [ca * ce, sa * ce, se]]).T  # right, up, to the observer
+    box, surface = _box(space, elements, x[:, :, :2], gamma), _outer(space, elements)
+    x, gamma = x[:, facets][surface], gamma[:, facets][surface]
+    normal = np.cross(x[:, 2] - x[:, 0], x[:, 3] - x[:, 1])
+    light = 0.65 + 0.35 * np.clip(normal @ _LIGHT / np.linalg.norm(normal, axis=1), 0, 1)
+    faces = np.dstack([x[:, :, :2], gamma, np.broadcast_to(light[:, None], gamma.shape)])
+    seen = np.flatnonzero(normal[:, 2] > 0)
+    return Body(_triangles(faces[seen[np.argsort(x[seen, :, 2].mean(axis=1))]]), np.zeros((0, 2, 2)), box)
+
+
+def _triangles(faces: np.ndarray) -> np.ndarray:
+    """Four triangles about the centre of each face (nf, 4, 4), cut off where gamma falls below `CRACKED`."""
+    centre = np.broadcast_to(faces.mean(axis=1, keepdims=True), faces.shape)
+    fan = np.stack([faces, np.roll(faces, -1, axis=1), centre], axis=2).reshape(-1, 3, 4)
+    above = fan[:, :, 2] >= CRACKED
+    count = above.sum(axis=1)
+    whole, rim = np.flatnonzero(count == 3), np.flatnonzero(count % 3)
+    one = count[rim] == 1
+    first = np.where(one, above[rim].argmax(axis=1), above[rim].argmin(axis=1))  # the corner unlike the two others
+    a, b, c = (fan[rim, (first + k) % 3] for k in range(3))
+    ab, ac = (a + (end - a) * (CRACKED - a[:, 2:3]) / (end - a)[:, 2:3] for end in (b, c))
+    kept = [fan[whole], *(np.stack(corners, axis=1)[mask] for corners, mask in
+                          (((a, ab, ac), one), ((ab, b, c), ~one), ((ab, c, ac), ~one)))]
+    order = np.concatenate([whole, rim[one], rim[~one], rim[~one]])
+    return np.concatenate(kept)[np.argsort(order, kind="stable")]
+
+
+def _outer(space: Space, elements: np.ndarray) -> np.ndarray:
+    """Which facets of the elements, (nl, facets), are shared with no other of them."""
+    nodes = np.sort(space.conn[elements][:, _FACETS[space.dim]], axis=2)
+    key = nodes[:, :, :space.dim] @ space.n_nodes ** np.arange(space.dim)  # as many nodes as tell facets apart
+    _, inverse, counts = np.unique(key, return_inverse=True, return_counts=True)
+    return np.asarray(counts[inverse] == 1).reshape(key.shape)
+
+
+def _box(space: Space, elements: np.ndarray, x: np.ndarray, gamma: np.ndarray) -> np.ndarray:
+    """Least and greatest x, y (2, 2) of the pieces of the body that are not small fragments."""
+    element, corner = np.nonzero(gamma >= SPENT)
+    touches = csr_array((np.ones(len(element), np.int8), (element, space.conn[elements[element], corner])))
+    _, piece = connected_components(touches @ touches.T, directed=False)
+    volume = np.bincount(piece, space.V[elements])
+    kept = x[volume[piece] > LEAST_PIECE * volume.sum()].reshape(-1, 2)
+    return np.array([kept.min(axis=0), kept.max(axis=0)])
