@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, NoReturn
 
-from cyclopts import App
+from cyclopts import App, ArgumentCollection, Group
 from cyclopts.exceptions import CycloptsError
 
 from . import __version__
@@ -20,21 +22,29 @@ BAD_INPUT, INTERRUPTED = 2, 130
 
 def command(function: Callable[..., Any], arguments: list[str] | None = None) -> NoReturn:
     """Run `function` with the command line's arguments; an error a user can cure is one line and exit status 2."""
-    app = App(name=f"python -m skfsink.cases.{function.__name__}", version=__version__)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends a run as Ctrl-C does
+    given: set[str] = set()
+
+    def note(app: App, commands: tuple[str, ...], found: ArgumentCollection) -> None:
+        given.update(argument.name.lstrip("-").replace("-", "_") for argument in found if argument.tokens)
+
+    app = App(name=f"python -m skfsink.cases.{function.__name__}", version=f"skfsink {__version__}", config=note,
+              group_commands=Group.create_ordered("Help"))
     app.default(function)
     try:
-        app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
+        call, bound, _ = app.parse_args(arguments, exit_on_error=False, print_error=False)
+        if "options" in bound.arguments:
+            bound.arguments["options"] = replace(bound.arguments["options"], given=frozenset(given))
+        call(*bound.args, **bound.kwargs)
     except Interrupted as stop:
         _fail(str(stop), INTERRUPTED)
     except KeyboardInterrupt:
-        _fail("interrupted at once; the last checkpoint stands", INTERRUPTED)
-    except SkfsinkError as error:
+        _fail("interrupted", INTERRUPTED)
+    except (SkfsinkError, CycloptsError) as error:
         _fail(str(error), BAD_INPUT)
-    except CycloptsError as error:
-        _fail(" ".join(str(error).split()), BAD_INPUT)
     raise SystemExit(0)
 
 
 def _fail(message: str, status: int) -> NoReturn:
-    print(f"skfsink: {message}", file=sys.stderr)
+    print("skfsink:", " ".join(message.split()), file=sys.stderr)
     raise SystemExit(status)

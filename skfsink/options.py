@@ -15,7 +15,7 @@ from .hht import HHTControls
 from .material import AAA, SinkLaw
 from .scene import Controls
 
-__all__ = ["GEOMETRY", "Options"]
+__all__ = ["SAMPLE", "Options"]
 
 NOT_PHYSICS = ("out", "resume", "overwrite", "quiet", "given")  # say where a run goes, not what it is
 
@@ -33,9 +33,8 @@ def _group(name: str) -> Parameter:
     return Parameter(group=Group.create_ordered(name), converter=_number)
 
 
-GEOMETRY, MATERIAL, SINK, LOADING, ANALYSIS, EXPLICIT, HHT, CONTROLS, OUTPUT = (
-    _group(name) for name in ("Geometry", "Material", "Sink", "Loading", "Analysis", "Explicit integrator",
-                              "HHT integrator", "Controls", "Output"))
+SAMPLE, MATERIAL, SINK, LOADING, ANALYSIS, EXPLICIT, HHT, CONTROLS, OUTPUT = map(_group, (
+    "Sample", "Material", "Sink", "Loading", "Analysis", "Explicit integrator", "HHT integrator", "Controls", "Output"))
 FLAG = Parameter(negative="", show_default=False)
 
 
@@ -46,26 +45,46 @@ class Options:
 
     Parameters
     ----------
-    speed
-        Speed of a grip [mm/s], > 0.
     c1
         First constant of the stored energy [MPa], > 0.
     c2
         Second constant of the stored energy [MPa], >= 0.
     bulk_modulus
         Bulk modulus k [MPa], > 0.
+    density
+        Density of the intact material ρ0 [kg/m^3], > 0.
     phi
         Energy limiter Φ [MPa], > 0.
     m
         Sharpness of the energy limiter, >= 1.
     length_scale
         Characteristic length l of damage [mm], > 0.
-    density
-        Density of the intact material ρ0 [kg/m^3], > 0.
+    sink
+        Quadrature of the sink: "lumped" (row sums), "consistent" (the paper's) or "nearest" (node).
+    deletion
+        γ at which an element fails, in (0, 0.01].
+    force_floor
+        γ below which a Gauss point exerts no force, in [0, 0.1].
+    speed
+        Speed of a grip [mm/s], > 0.
+    overshoot
+        Scaling of the state past the onset, relative to the onset displacement, in (0, 0.1].
     analysis
         "dynamic", "quasistatic" or "both".
     integrator
         Of the dynamic event: "explicit" or "hht".
+    element
+        "jbar" (element-constant J̄) or "plain" (standard Q1, locks).
+    event_time
+        Longest dynamic event [s], > 0.
+    aftermath
+        Time for which the event goes on after the sample has come apart [s], >= 0.
+    courant
+        Explicit step over the stability limit estimated for the deformed state, in (0, 1].
+    gamma_every
+        Explicit steps between solves for γ, >= 1; 0 takes as many as fit in 0.03 l/c_s (0.1 µs).
+    mass_floor
+        Least lumped mass of a node in the explicit scheme, relative to the intact one, in [0, 1).
     hht_alpha
         Damping parameter α of HHT, in [-1/3, 0].
     hht_dt
@@ -74,36 +93,16 @@ class Options:
         Of the two fields in an HHT step: "iterated" or "single" (one pass).
     mass
         Of HHT: "lumped" (row sums, as in the explicit scheme) or "consistent" (the paper's).
-    courant
-        Explicit step over the stability limit estimated for the deformed state, in (0, 1].
-    gamma_every
-        Explicit steps between solves for γ, >= 1; 0 takes as many as fit in 0.03 l/c_s (0.1 µs).
-    sink
-        Quadrature of the sink: "lumped" (row sums), "consistent" (the paper's) or "nearest" (node).
-    element
-        "jbar" (element-constant J̄) or "plain" (standard Q1, locks).
-    overshoot
-        Scaling of the state past the onset, relative to the onset displacement, in (0, 0.1].
-    force_floor
-        γ below which a Gauss point exerts no force, in [0, 0.1].
-    mass_floor
-        Least lumped mass of a node in the explicit scheme, relative to the intact one, in [0, 1).
-    deletion
-        γ at which an element fails, in (0, 0.01].
-    event_time
-        Longest dynamic event [s], > 0.
-    aftermath
-        Time for which the event goes on after the sample has come apart [s], >= 0.
-    record_every
-        Time between rows of history.csv [s], > 0.
-    frame_every
-        Time between frames of the ParaView series [s], > 0.
     balance_tolerance
         Energy balance error, relative to the onset energy, at which the run stops, in (0, 1].
     checkpoint_every
         Wall time between checkpoints [s], > 0.
     threads
         Threads of the factorisations, >= 1; bits are reproducible with 1.
+    record_every
+        Time between rows of history.csv [s], > 0.
+    frame_every
+        Time between frames of the ParaView series [s], > 0.
     out
         Output folder; default results/CASE/MESH-ANALYSIS[-INTEGRATOR].
     resume
@@ -112,6 +111,8 @@ class Options:
         Use an output folder that is not empty.
     quiet
         Show no progress.
+    given
+        Names of the options that a command line gave; a resumed run checks that they are its own.
     """
 
     c1: Annotated[float, MATERIAL] = 0.617

@@ -11,7 +11,7 @@ from .crack import CrackTracker, Tips
 from .density import DensitySolver
 from .errors import InstabilityError
 from .momentum import Momentum
-from .output import History, Series
+from .output import History, Series, write_atomic
 from .scene import Scene
 from .state import State
 
@@ -101,9 +101,11 @@ class Recorder:
         return True
 
     def finish(self, state: State, reaction: np.ndarray, dt: float) -> None:
-        """Last row and frame."""
+        """Last row and frame, and the log of deleted elements."""
         self._record(state, reaction, dt)
         self.frame(state, "end")
+        log = "".join(f"{time!r},{element}\n" for time, element in state.deletions)
+        write_atomic(self.history.path.with_name("deletions.csv"), "time_s,element\n" + log)
 
     def frame(self, state: State, label: str) -> None:
         """Add the state to the ParaView series."""

@@ -58,7 +58,8 @@ def summarize(scene: Scene, simulation: Simulation) -> dict[str, Any]:
     return {
         "schema": SCHEMA, "case": scene.case, "mesh": scene.sample.name, "analysis": scene.controls.analysis,
         "integrator": scene.controls.integrator if dynamic else None,
-        "elements": space.n_elements, "dofs": {"displacement": int(simulation.free.sum()), "density": space.n_nodes},
+        "elements": space.n_elements, "dofs": int(simulation.free.sum()) + space.n_nodes,
+        "unknowns": {"displacement": int(simulation.free.sum()), "density": space.n_nodes},
         "onset": {k: onset[k] for k in ("displacement_mm", "reaction_N_per_mm", "elastic_energy", "gamma_min")},
         "event": {"first_arrival_s": tracker.arrival if dynamic else None,
                   "first_arrival_sweep": None if dynamic else tracker.arrival,
