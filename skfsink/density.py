@@ -13,6 +13,7 @@ from __future__ import annotations
 import logging
 
 import numpy as np
+from numba import njit
 
 from . import kernels
 from .errors import ConvergenceError, ParameterError
@@ -67,8 +68,10 @@ class DensitySolver:
         """Numerical factorisations made so far."""
         return 0 if self._direct is None else self._direct.count
 
-    def solve(self, W_max: np.ndarray, gamma: np.ndarray) -> np.ndarray:
+    def solve(self, W_max: np.ndarray, gamma: np.ndarray, reduction: float = 0.0) -> np.ndarray:
         """Nodal gamma (n,) for the history `W_max` (ne, nq) [MPa], from the guess `gamma`.
+
+        With `reduction` the residual need fall only to that fraction of the guess's (see :meth:`AmgCG.solve`).
 
         Raises
         ------
@@ -76,14 +79,15 @@ class DensitySolver:
             The solution is not finite, or the lumped one leaves (0, 1] by more than the solver's tolerance.
         """
         sink = 1.0 / (self.law.history(W_max) + self.law.epsilon)
-        if self.last_sink is not None and np.all(np.abs(sink - self.last_sink) <= self.unchanged * self.last_sink):
+        if self.last_sink is not None and not _changed(sink, self.last_sink, self.unchanged):
             self.skipped += 1
             return gamma
         self.solves += 1
         data = self._assemble(sink)
         result = None
         if self.sink != "consistent" or sink.max() < 1e3 * sink.min():
-            result = self._amg.solve(self.pattern.matrix(data), self.load, gamma)
+            diagonal = data[self.pattern.diagonal]
+            result = self._amg.solve(self.pattern.matrix(data), diagonal, self.load, gamma, reduction)
             self.iterations += self._amg.iterations
         if result is None:
             result = self._factorise(data)
@@ -134,3 +138,12 @@ class DensitySolver:
         keep = self.pattern.indices >= np.repeat(np.arange(self.pattern.size), np.diff(self.pattern.indptr))
         self._direct.factorize(data[keep] * scale[rows] * scale[upper.indices])
         return scale * self._direct.solve(scale * self.load, tolerance=1e-10)
+
+
+@njit(cache=True)
+def _changed(new, old, tolerance):  # type: ignore[no-untyped-def]
+    for e in range(new.shape[0]):
+        for q in range(new.shape[1]):
+            if abs(new[e, q] - old[e, q]) > tolerance * old[e, q]:
+                return True
+    return False

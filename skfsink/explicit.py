@@ -101,6 +101,7 @@ class Explicit:
 
     GAMMA_INTERVAL = 0.03  # l/c_s between solves for gamma; the crack then runs less than 3 % of l
     GAMMA_MOST = 20  # steps between them at the most, lest a failing element that shortens the step keeps failing
+    REDUCTION = 1e-3  # of the residual in a solve for gamma: the error is that fraction of the change since the last
     CHECK = 5        # steps between looks at the cheap indicator
     FED_IN = 1e-6    # energy a step may feed in before omega_max is estimated at once, of the initial energy
 
@@ -187,7 +188,7 @@ class Explicit:
         momentum, ledger = self.momentum, state.ledger
         self.sync(state)
         solves = self.density.solves
-        state.gamma = self.density.solve(state.W_max, state.gamma)
+        state.gamma = self.density.solve(state.W_max, state.gamma, self.REDUCTION)
         if self.density.solves == solves:
             return
         delete_failed(self.space, state, self.deletion, self.density.law.failure_energy)
@@ -229,7 +230,7 @@ class Explicit:
             self._indicator0, self._last_estimate, ratio = indicator, state.step, 1.0
             self.estimates += 1
             self._urgent = False
-        self.dt = c.courant * 2.0 / (self._omega * np.sqrt(max(1.0, ratio)))
+        self.dt = float(c.courant * 2.0 / (self._omega * np.sqrt(max(1.0, ratio))))
 
     def _indicator(self, u: np.ndarray) -> float:
         """Greatest volumetric stiffness of an element over its mass, gamma_bar k |b|^2_(1/m)/V.
@@ -237,8 +238,8 @@ class Explicit:
         It is the Rayleigh quotient of M^-1 b, so a lower bound of omega_max^2, and follows it closely.
         """
         g = self.momentum.space.element_mean(self.momentum.gamma)
-        return float(_volumetric_ratio(self.space.conn, self.space.X + u, self.space.dN, self.space.w, g, self.mass)
-                     * self.momentum.material.bulk_modulus)
+        return float(_volumetric_ratio(self.space.conn, self.space.X + u, self.space.dN, self.space.w, g, self.mass,
+                                       self._free) * self.momentum.material.bulk_modulus)
 
     # --- checkpoints ---
     def memory(self) -> dict[str, np.ndarray]:
@@ -294,7 +295,7 @@ def _kick(v, a, free, mass, old, force, du, dt):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _volumetric_ratio(conn, x, dN, w, gamma_bar, mass):  # type: ignore[no-untyped-def]
+def _volumetric_ratio(conn, x, dN, w, gamma_bar, mass, free):  # type: ignore[no-untyped-def]
     ne, nq, na, dim = dN.shape
     b = np.empty((na, dim))
     F = np.empty((dim, dim))
@@ -326,6 +327,7 @@ def _volumetric_ratio(conn, x, dN, w, gamma_bar, mass):  # type: ignore[no-untyp
         total = 0.0
         for a in range(na):
             for i in range(dim):
-                total += b[a, i] ** 2 / mass[conn[e, a]]
+                if free[conn[e, a], i]:
+                    total += b[a, i] ** 2 / mass[conn[e, a]]
         greatest = max(greatest, gamma_bar[e] * total / V)
     return greatest

@@ -168,9 +168,13 @@ class AmgCG:
                     np.random.set_state(state)
                 self._coarse = cycle.matvec
 
-    def solve(self, A: csr_array, b: np.ndarray, x: np.ndarray) -> np.ndarray | None:
-        """Solution of A x = b from the guess `x`; None if it did not converge in `max_iterations`."""
-        D = A.diagonal()
+    def solve(self, A: csr_array, D: np.ndarray, b: np.ndarray, x: np.ndarray,
+              reduction: float = 0.0) -> np.ndarray | None:
+        """Solution of A x = b from the guess `x`; None if it did not converge in `max_iterations`.
+
+        `D` is the diagonal of A. With `reduction` the solve may stop when the residual is that fraction of the one of
+        the guess, or 1e-6, whichever is less: what is left then is that fraction of what the solve had to change.
+        """
         smoother = self.OMEGA / D
         live = (self.DEAD * self._diagonal0 > D).astype(float)
         indptr, indices, data = _unsigned(A)
@@ -180,20 +184,22 @@ class AmgCG:
         # one Jacobi sweep puts the unknowns with a huge diagonal where they belong
         _residual(indptr, indices, data, x, b, r)
         x += r / D
-        for restart in range(2):
+        target, total = 0.0, 0
+        for attempt in range(3):
             _residual(indptr, indices, data, x, b, r)
             self.residual = float(np.linalg.norm(r)) / size
-            if self.residual <= self.tolerance:
-                self.iterations = 0 if restart == 0 else self.iterations
-                return x
-            if self._iterate(A, r, x, smoother, live, size) is None:
+            if attempt == 0:
+                target = max(self.tolerance, min(reduction * self.residual, 1e-6))
+            if self.residual <= target or attempt == 2:
+                break
+            if self._iterate(A, r, x, smoother, live, target * size) is None:
                 return None
-        _residual(indptr, indices, data, x, b, r)
-        self.residual = float(np.linalg.norm(r)) / size
-        return x if self.residual <= 2 * self.tolerance else None
+            total += self.iterations
+        self.iterations = total
+        return x if self.residual <= 2 * target else None
 
     def _iterate(self, A: csr_array, r: np.ndarray, x: np.ndarray, smoother: np.ndarray, live: np.ndarray,
-                 size: float) -> bool | None:
+                 target: float) -> bool | None:
         indptr, indices, data = _unsigned(A)
         z, t, q = np.empty_like(r), np.empty_like(r), np.empty_like(r)
         p = np.zeros_like(r)
@@ -211,7 +217,7 @@ class AmgCG:
             if not (np.isfinite(pq) and pq > 0.0):
                 return None
             self.iterations += 1
-            if _advance(rz / pq, p, q, x, r) <= self.tolerance * size:
+            if _advance(rz / pq, p, q, x, r) <= target:
                 return True
         return None
 

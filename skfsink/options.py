@@ -28,13 +28,14 @@ def _number(kind: type, tokens: Sequence[Token]) -> Any:
         return tokens[0].value
 
 
-def _group(name: str) -> Parameter:
-    """Options that `--help` shows together."""
+def _numbers(name: str) -> Parameter:
+    """Numbers, and words, that `--help` shows together."""
     return Parameter(group=Group.create_ordered(name), converter=_number)
 
 
-SAMPLE, MATERIAL, SINK, LOADING, ANALYSIS, EXPLICIT, HHT, CONTROLS, OUTPUT = map(_group, (
-    "Sample", "Material", "Sink", "Loading", "Analysis", "Explicit integrator", "HHT integrator", "Controls", "Output"))
+SAMPLE, MATERIAL, SINK, LOADING, ANALYSIS, EXPLICIT, HHT, CONTROLS = map(_numbers, (
+    "Sample", "Material", "Sink", "Loading", "Analysis", "Explicit integrator", "HHT integrator", "Controls"))
+OUTPUT = Parameter(group=Group.create_ordered("Output"))
 FLAG = Parameter(negative="", show_default=False)
 
 
@@ -95,14 +96,14 @@ class Options:
         Of HHT: "lumped" (row sums, as in the explicit scheme) or "consistent" (the paper's).
     balance_tolerance
         Energy balance error, relative to the onset energy, at which the run stops, in (0, 1].
-    checkpoint_every
-        Wall time between checkpoints [s], > 0.
-    threads
-        Threads of the factorisations, >= 1; bits are reproducible with 1.
     record_every
         Time between rows of history.csv [s], > 0.
     frame_every
         Time between frames of the ParaView series [s], > 0.
+    checkpoint_every
+        Wall time between checkpoints [s], > 0.
+    threads
+        Threads of the factorisations, >= 1; bits are reproducible with 1.
     out
         Output folder; default results/CASE/MESH-ANALYSIS[-INTEGRATOR].
     resume
@@ -140,10 +141,10 @@ class Options:
     coupling: Annotated[str, HHT] = "iterated"
     mass: Annotated[str, HHT] = "lumped"
     balance_tolerance: Annotated[float, CONTROLS] = 0.05
+    record_every: Annotated[float, CONTROLS] = 1e-6
+    frame_every: Annotated[float, CONTROLS] = 5e-6
     checkpoint_every: Annotated[float, CONTROLS] = 20.0
     threads: Annotated[int, CONTROLS] = 1
-    record_every: Annotated[float, OUTPUT] = 1e-6
-    frame_every: Annotated[float, OUTPUT] = 5e-6
     out: Annotated[Path | None, OUTPUT] = None
     resume: Annotated[Path | None, OUTPUT] = None
     overwrite: Annotated[bool, OUTPUT, FLAG] = False

@@ -110,9 +110,9 @@ def prepare_folder(path: str | Path, overwrite: bool = False) -> Path:
         It is no folder, cannot be written, or has something in it and `overwrite` was not given.
     """
     path = Path(path)
-    if path.exists() and not path.is_dir():
-        raise OutputError(f"the output folder {path} is a file")
     with _reported(f"cannot write to the output folder {path}"):
+        if path.exists() and not path.is_dir():
+            raise OutputError(f"the output folder {path} is a file")
         path.mkdir(parents=True, exist_ok=True)
         if not overwrite and any(path.iterdir()):
             raise OutputError(f"the output folder {path} is not empty; name another one, or allow to overwrite it")

@@ -11,7 +11,7 @@ from .crack import CrackTracker, Tips
 from .density import DensitySolver
 from .errors import InstabilityError
 from .momentum import Momentum
-from .output import History, Series, write_atomic
+from .output import History, Series, prepare_folder, write_atomic
 from .scene import Scene
 from .state import State
 
@@ -38,18 +38,19 @@ class Recorder:
         named = [grip.boundary for grip in scene.grips] + list(scene.notch)
         self.tracker = CrackTracker(space, scene.sink_law.length_scale, scene.material.shear_wave_speed, held,
                                     sample.free_edge(*named))
-        self.history = History(folder / "history.csv", memory["rows"] if memory else ())
-        (folder / "series").mkdir(exist_ok=True)
+        if memory is None:
+            prepare_folder(folder / "series", overwrite=True)
         self.series = Series(folder / "series", "run", space)
         self.tips: Tips = self.tracker.look(0.0, np.ones(space.n_nodes))
         self.tracker.track.clear()
-        memory = memory or {"frames": [], "moments": {}, "onset": {}, "at_arrival": {}}
+        memory = memory or {"rows": [], "frames": [], "moments": {}, "onset": {}, "at_arrival": {}}
         self.frames: list[tuple[float, str]] = [(float(t), str(label)) for t, label in memory["frames"]]
         self.moments: dict[str, int] = dict(memory["moments"])
         self.onset: dict[str, float] = dict(memory["onset"])
         self.at_arrival: dict[str, float] = dict(memory["at_arrival"])
         self.separated_at = float(memory.get("separated_at", np.inf))   #: first record after the separation [s]
-        self.series.resume(len(self.frames))
+        self.series.resume(len(self.frames))  # this may refuse, before any file is touched
+        self.history = History(folder / "history.csv", memory["rows"])
         self._load_nodes = held[0]
         first = np.array([v or 0.0 for v in scene.grips[0].velocity])
         self._load_direction = first / (np.linalg.norm(first) or 1.0)

@@ -2,41 +2,60 @@
 
 from __future__ import annotations
 
+import inspect
+import shlex
 from collections.abc import Callable
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from .checkpoint import load_state
+from .checkpoint import load_checkpoint, load_state
 from .errors import OutputError, ParameterError
 from .options import NOT_PHYSICS, Options
-from .output import prepare_folder, write_atomic, write_summary
+from .output import History, prepare_folder, write_atomic, write_summary
 from .pictures import draw_comparison, draw_run
 from .progress import Display
 from .result import Result, summarize
 from .scene import Scene, read_parameters
-from .simulate import Simulation, onset_copy
+from .simulate import Interrupted, Simulation, onset_copy
 from .state import State
 
 __all__ = ["run_case"]
 
 SceneMaker = Callable[[dict[str, Any], Options], Scene]
+SCENE, SUMMARY = "scene.toml", "summary.json"
 
 
-def run_case(case: str, make_scene: SceneMaker, own: dict[str, Any], options: Options) -> Result:
+def run_case(case: Callable[..., Result], make_scene: SceneMaker, own: dict[str, Any], options: Options) -> Result:
     """Run a case: `own` are the arguments of its function, `make_scene` turns them into a scene.
 
     With `options.resume` the arguments are those in that folder's `scene.toml`; any that was given besides must agree.
+
+    Raises
+    ------
+    Interrupted
+        Ctrl-C or SIGTERM; the message says how to go on.
     """
+    name = case.__name__
+    if Path(own["mesh"]).suffix:  # a file: the run may be resumed from another folder
+        own = {**own, "mesh": str(Path(own["mesh"]).absolute())}
     if options.resume is not None:
-        own, options = _resumed(case, own, options)
-    folder = options.resume or options.out or _default_folder(case, own, options)
-    with Display(options.quiet) as display:
-        if options.analysis != "both":
-            return _run_one(make_scene, own, options, folder, display, None)
-        return _run_both(case, make_scene, own, options, folder, display)
+        defaults = {k: p.default for k, p in inspect.signature(case).parameters.items()}
+        own, options = _resumed(name, own, defaults, options)
+    folder = options.resume or options.out or _default_folder(name, own, options)
+    resume = options.resume is not None
+    try:
+        with Display(options.quiet) as display:
+            scene = make_scene(own, options)
+            if options.analysis == "both":
+                return _run_both(scene, folder, display, resume, options.overwrite)
+            if not resume:
+                _begin(folder, options.overwrite)
+            return _run_one(scene, folder, display, resume)
+    except (Interrupted, KeyboardInterrupt):
+        begun = (folder / SCENE).exists()
+        raise Interrupted("interrupted; " + (f"go on with --resume {shlex.quote(str(folder))}" if begun else
+                                             "nothing was computed yet")) from None
 
 
 def _default_folder(case: str, own: dict[str, Any], options: Options) -> Path:
@@ -46,66 +65,79 @@ def _default_folder(case: str, own: dict[str, Any], options: Options) -> Path:
     return Path("results") / case / name
 
 
-def _resumed(case: str, own: dict[str, Any], options: Options) -> tuple[dict[str, Any], Options]:
+def _resumed(case: str, own: dict[str, Any], defaults: dict[str, Any],
+             options: Options) -> tuple[dict[str, Any], Options]:
     folder = options.resume
     assert folder is not None
+    if options.out is not None and options.out.absolute() != folder.absolute():
+        raise ParameterError(f"--out {options.out} and --resume {folder} are two folders; a run stays in its own")
     stored = read_parameters(folder, case)
-    defaults = Options()
-    for name, value in options.parameters().items():
-        if value != getattr(defaults, name) and value != stored.get(name):
+    defaults = {**Options().parameters(), **defaults}
+    for name, value in {**own, **options.parameters()}.items():
+        if (name in options.given or value != defaults[name]) and value != stored.get(name):
             raise ParameterError(f"--{name.replace('_', '-')} {value} is not that of the run in {folder} "
                                  f"({stored.get(name)}); a resumed run keeps its scene")
     known = {f.name for f in fields(Options)} - set(NOT_PHYSICS)
     try:
-        options = replace(options, **{k: v for k, v in stored.items() if k in known})
-        own = {k: stored[k] for k in own}
-    except (KeyError, TypeError) as error:
-        raise OutputError(f"{folder / 'scene.toml'} is not the scene of a run: {error}") from None
-    return own, options
+        own = {k: stored.pop(k) for k in own}
+        if unknown := stored.keys() ^ known:
+            raise KeyError(*sorted(unknown))
+    except KeyError as error:
+        raise OutputError(f"{folder / SCENE} is not the scene of a run: parameter {error}") from None
+    return own, replace(options, **stored)
 
 
-def _run_both(case: str, make_scene: SceneMaker, own: dict[str, Any], options: Options, folder: Path,
-              display: Display) -> Result:
-    if options.resume is None:
-        prepare_folder(folder, options.overwrite)
-        write_atomic(folder / "scene.toml", make_scene(own, options).toml())
+def _begin(folder: Path, overwrite: bool) -> None:
+    """Make the folder of a new run; what is left in it of an older one is no run that could be resumed."""
+    prepare_folder(folder, overwrite)
+    for name in (SCENE, SUMMARY, Simulation.CHECKPOINT, Simulation.ONSET):
+        (folder / name).unlink(missing_ok=True)
+
+
+def _run_both(scene: Scene, folder: Path, display: Display, resume: bool, overwrite: bool) -> Result:
+    scenes = {analysis: scene.part(analysis) for analysis in ("dynamic", "quasistatic")}
+    begun = {analysis: resume and (folder / analysis / SCENE).exists() for analysis in scenes}
+    for analysis, part in scenes.items():  # refuse before any file is touched
+        if begun[analysis]:
+            state, *_ = load_checkpoint(folder / analysis / Simulation.CHECKPOINT, part.fingerprint)
+            if analysis == "dynamic" and state.phase != "loading":
+                load_state(folder / analysis / Simulation.ONSET, part.fingerprint)
+    if not resume:
+        _begin(folder, overwrite)
+        for analysis in scenes:
+            _begin(folder / analysis, overwrite)
+        write_atomic(folder / SCENE, scene.toml())
     parts: dict[str, Result] = {}
     onset: State | None = None
-    for analysis in ("dynamic", "quasistatic"):
-        part = folder / analysis
-        resume = part if options.resume is not None and (part / Simulation.CHECKPOINT).exists() else None
-        child = replace(options, analysis=analysis, out=None, resume=resume, overwrite=True)
-        parts[analysis] = _run_one(make_scene, own, child, part, display, onset)
-        dynamic_scene = parts["dynamic"].scene
-        onset = load_state(folder / "dynamic" / Simulation.ONSET, dynamic_scene.fingerprint)
+    for analysis, part in scenes.items():
+        if not begun[analysis]:
+            _begin(folder / analysis, overwrite=True)
+        parts[analysis] = _run_one(part, folder / analysis, display, begun[analysis], onset)
+        onset = load_state(folder / "dynamic" / Simulation.ONSET, scenes["dynamic"].fingerprint)
     display.phase("output")
     draw_comparison(parts["dynamic"], parts["quasistatic"], folder)
     first = parts["dynamic"]
-    summary = {"schema": first.summary["schema"], "case": case, "mesh": first.summary["mesh"], "analysis": "both",
+    summary = {"schema": first.summary["schema"], "case": scene.case, "mesh": first.summary["mesh"], "analysis": "both",
                **{name: part.summary for name, part in parts.items()}}
-    write_summary(folder / "summary.json", summary)
+    write_summary(folder / SUMMARY, summary)
     display.update(1.0, str(folder))
-    return Result(folder, first.scene, summary, first.history, first.state, parts)
+    return Result(folder, scene, summary, first.history, first.state, parts)
 
 
-def _run_one(make_scene: SceneMaker, own: dict[str, Any], options: Options, folder: Path, display: Display,
-             onset: State | None) -> Result:
-    scene = make_scene(own, options)
-    if options.resume is None:
-        prepare_folder(folder, options.overwrite)
-        (folder / Simulation.CHECKPOINT).unlink(missing_ok=True)
-        write_atomic(folder / "scene.toml", scene.toml())
-    simulation = Simulation(scene, folder, display, options.resume is not None)
+def _run_one(scene: Scene, folder: Path, display: Display, resume: bool, onset: State | None = None) -> Result:
+    simulation = Simulation(scene, folder, display, resume)
+    if not resume:
+        simulation.checkpoint()  # from here on the run can be resumed, whenever it is killed
+        write_atomic(folder / SCENE, scene.toml())
     space = scene.sample.space
-    display.say(f"{scene.title}, mesh {scene.sample.name}: {space.n_elements} elements, "
-                f"{int(simulation.free.sum())} + {space.n_nodes} unknowns; {options.analysis} analysis in {folder}")
+    display.say(f"{scene.title}, mesh {scene.sample.name}: {space.n_elements} elements, {int(simulation.free.sum())} + "
+                f"{space.n_nodes} unknowns; {scene.controls.analysis} analysis in {folder}")
     state = simulation.run(None if onset is None else onset_copy(onset))
     display.phase("output")
     display.update(0.0, "")
     draw_run(scene, folder, simulation.recorder)
     simulation._lap("output")
     summary = summarize(scene, simulation)
-    write_summary(folder / "summary.json", summary)
+    write_summary(folder / SUMMARY, summary)
     display.update(1.0, str(folder))
-    history: dict[str, np.ndarray] = type(simulation.recorder.history).load(folder / "history.csv")
-    return Result(folder, scene, summary, history, state, {})
+    return Result(folder, scene, summary, History.load(folder / "history.csv"), state, {})

@@ -14,7 +14,7 @@ import numpy as np
 import skfem
 from skfem.io.meshio import HEX_MAPPING
 
-from .errors import MeshError
+from .errors import MeshError, SkfsinkError
 from .meshing import read_mesh
 from .space import Space
 
@@ -84,7 +84,7 @@ def load_sample(case: str, mesh: str, make: Callable[[], meshio.Mesh] | None = N
         `make` was given and gmsh is not installed.
     """
     if make is not None:
-        return _from_meshio(mesh, make())
+        return _from_meshio(mesh, _read(make, f"the mesh {mesh} cannot be made"))
     folder = data_folder(case) / "meshes"
     known = sorted(p.stem for p in folder.glob("*.vtu"))
     path = folder / f"{mesh}.vtu"
@@ -94,31 +94,40 @@ def load_sample(case: str, mesh: str, make: Callable[[], meshio.Mesh] | None = N
             raise MeshError(f"mesh must be one of {', '.join(known)}, or the path of a mesh file; got {mesh!r}")
         if not path.is_file():
             raise MeshError(f"there is no mesh file {mesh}")
+    return _from_meshio(mesh, _read(lambda: read_mesh(path), f"the mesh file {path} cannot be read"))
+
+
+def _read(source: Callable[[], meshio.Mesh], failure: str) -> meshio.Mesh:
+    """The mesh from a library that prints, exits and raises what it likes."""
     try:
         with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
-            data = read_mesh(path)
+            return source()
+    except SkfsinkError:
+        raise
     except (Exception, SystemExit) as error:
-        first = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise MeshError(f"the mesh file {path} cannot be read: {first}") from None
-    return _from_meshio(mesh, data)
+        reason = str(error).strip() or type(error).__name__
+        raise MeshError(f"{failure}: {reason.splitlines()[0]}") from None
 
 
 def _from_meshio(name: str, data: meshio.Mesh) -> Sample:
     present = [kind for kind in _CELLS if kind in data.cells_dict]
     others = sorted({b.type for b in data.cells} - {"quad", "hexahedron", "line", "vertex"})
-    if not present or others:
+    if others or not any(len(data.cells_dict[kind]) for kind in present):
         raise MeshError(f"mesh {name} must consist of quadrilaterals or hexahedra; it has "
                         f"{', '.join(sorted({b.type for b in data.cells})) or 'no cells'}")
     kind = "hexahedron" if "hexahedron" in present else "quad"
     mesh_class, facet = _CELLS[kind]
     cells = data.cells_dict[kind]
-    if cells.size and (cells.min() < 0 or cells.max() >= len(data.points)):
+    if cells.min() < 0 or cells.max() >= len(data.points):
         raise MeshError(f"mesh {name} has elements with nodes that do not exist")
     dim = 2 if kind == "quad" else 3
     points = np.asarray(data.points, float)[:, :dim]
     connectivity = cells.T if kind == "quad" else cells[:, HEX_MAPPING[:8]].T
-    space = Space(mesh_class(np.ascontiguousarray(points.T), np.ascontiguousarray(connectivity.astype(np.int64))))
-    return Sample(name, space, _boundaries(data, facet))
+    try:
+        space = Space(mesh_class(np.ascontiguousarray(points.T), np.ascontiguousarray(connectivity.astype(np.int64))))
+    except MeshError as error:
+        raise MeshError(f"mesh {name}: {error}") from None
+    return Sample(Path(name).stem, space, _boundaries(data, facet))
 
 
 def _boundaries(data: meshio.Mesh, facet: str) -> dict[str, np.ndarray]:

@@ -161,15 +161,16 @@ class Scene:
         head = (f"# A run of skfsink. Run it again with: python -m skfsink.cases.{self.case} "
                 "and the parameters below.\n"
                 "# Plain numbers are in N, mm, MPa and s; density in kg/m^3.\n")
-        parameters = {k: v for k, v in self.parameters.items() if v is not None}
+        parameters = {k: v.item() if isinstance(v, np.generic) else v for k, v in self.parameters.items()}
         return head + tomli_w.dumps({"case": self.case, "parameters": parameters, "assumed": list(self.assumed)})
 
     @property
     def fingerprint(self) -> str:
-        """Hash of all that decides the results of the run: the parameters and the mesh."""
-        hashed, space = hashlib.sha256(self.toml().encode()), self.sample.space
+        """Hash of all that decides the results of the run: the parameters, and the mesh but for where its file is."""
+        text = replace(self, parameters={**self.parameters, "mesh": ""}).toml()
+        hashed, space = hashlib.sha256(text.encode()), self.sample.space
         for array in (space.X, space.conn, *(nodes for _, nodes in sorted(self.sample.boundaries.items()))):
-            hashed.update(np.ascontiguousarray(array))
+            hashed.update(array.tobytes())
         return hashed.hexdigest()
 
 
@@ -182,6 +183,8 @@ def read_parameters(folder: Path, case: str) -> dict[str, Any]:
         The folder holds no readable scene, or one of another case.
     """
     path = folder / "scene.toml"
+    if not path.is_file():
+        raise OutputError(f"{folder} holds no run to resume: there is no {path}")
     try:
         data = tomllib.loads(path.read_text())
         found, parameters = str(data["case"]), dict(data["parameters"])

@@ -10,7 +10,7 @@ from typing import Any
 from .checkpoint import load_checkpoint, save_checkpoint, save_state
 from .density import DensitySolver
 from .energy import Ledger
-from .errors import SkfsinkError
+from .errors import CheckpointError, SkfsinkError
 from .explicit import Explicit
 from .hht import HHT
 from .momentum import Momentum
@@ -49,6 +49,8 @@ class Simulation:
     def __init__(self, scene: Scene, folder: Path, display: Display, resume: bool = False) -> None:
         # a checkpoint that cannot be used is refused before any file is touched
         stored = load_checkpoint(folder / self.CHECKPOINT, scene.fingerprint) if resume else None
+        if stored and "recorder" not in stored[2]:
+            raise CheckpointError(f"the checkpoint {folder / self.CHECKPOINT} is damaged: it is a state without its run")
         self.scene, self.folder, self.display = scene, folder, display
         c, space = scene.controls, scene.sample.space
         self.free, self.grip_velocity = scene.constraints()
@@ -86,6 +88,8 @@ class Simulation:
                 self.state.phase = "done"
             self._lap("event")
             self.checkpoint()
+            if interrupt.received:
+                raise Interrupted("interrupted")
         return self.state
 
     def _load(self) -> None:
@@ -190,7 +194,7 @@ class Simulation:
             self.checkpoint()
             self._saved = time.perf_counter()
             if self._interrupt.received:
-                raise Interrupted(f"interrupted; go on with --resume {self.folder}")
+                raise Interrupted("interrupted")
 
     def _solver_counts(self) -> dict[str, int]:
         factorisations = self.statics.solver.count + self.density.factorisations

@@ -2,10 +2,20 @@
 
 from __future__ import annotations
 
+import copy
+from collections.abc import Callable
+from typing import NamedTuple
+
 import numpy as np
 import skfem
 
+from skfsink.density import DensitySolver
+from skfsink.energy import Ledger
+from skfsink.material import AAA, SinkLaw
+from skfsink.momentum import Momentum
 from skfsink.space import Space
+from skfsink.state import State
+from skfsink.statics import Statics
 
 
 def distorted(mesh: skfem.Mesh, amount: float, seed: int = 0) -> skfem.Mesh:
@@ -79,3 +89,27 @@ def patchy(space: Space, seed: int = 2, dead: float = 0.2) -> np.ndarray:
     gamma = rng.uniform(0.01, 1, space.w.shape)
     gamma[rng.uniform(size=space.n_elements) < dead] = 0.0
     return gamma
+
+
+class Fracture(NamedTuple):
+    """A body just past its onset: a maker of fresh states, and what an integrator takes."""
+
+    fresh: Callable[[], State]
+    momentum: Momentum
+    density: DensitySolver
+    free: np.ndarray
+    velocity: np.ndarray
+
+
+def at_onset(space: Space, speed: float = 1e-3, overshoot: float = 0.01) -> Fracture:
+    """`space` loaded to its onset and scaled just past it, as the event of a run begins."""
+    momentum, density = Momentum(space, AAA()), DensitySolver(space, SinkLaw())
+    free, velocity = grips(space, speed)
+    state = State.intact(space)
+    for _ in Statics(momentum, density, free, velocity).load(state):
+        pass
+    assert state.gamma.min() > 0.85
+    state.u *= 1 + overshoot
+    state.grip *= 1 + overshoot
+    state.time, state.step, state.ledger = 0.0, 0, Ledger()
+    return Fracture(lambda: copy.deepcopy(state), momentum, density, free, velocity)

@@ -1,9 +1,9 @@
-"""Fixtures shared by the tests: one distorted mesh of each kind."""
+"""Fixtures shared by the tests: one distorted mesh of each kind, one plate about to break."""
 
 from __future__ import annotations
 
 import pytest
-from bodies import box
+from bodies import Fracture, at_onset, box, notched
 
 from skfsink.space import Space
 
@@ -18,3 +18,9 @@ def kind(request: pytest.FixtureRequest) -> str:
 def space(kind: str) -> Space:
     """Distorted mesh of the unit square (25 quads) or cube (64 hexes, a full tile; quads leave one partly filled)."""
     return box(kind, 5 if kind == "quad" else 4)
+
+
+@pytest.fixture(scope="session")
+def fracture() -> Fracture:
+    """A notched plate of 219 quads just past its onset; loading takes two seconds, so it is done once."""
+    return at_onset(notched(15))

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
+from pathlib import Path
+from typing import Annotated, Any
 
-from ..errors import require
+from ..errors import ParameterError, require
 from ..meshing import MESHES, single_edge_notch_mesh
-from ..options import Options
+from ..options import SAMPLE, Options
 from ..result import Result
 from ..run import run_case
 from ..sample import load_sample
@@ -22,8 +23,9 @@ ASSUMED = (
 )
 
 
-def single_edge_notch(*, side: float = 4.0, notch: float = 1.0, notch_width: float = 0.1, mesh: str = "M3",
-                      mesh_seed: int = 0, options: Options = Options()) -> Result:  # noqa: B008
+def single_edge_notch(*, side: Annotated[float, SAMPLE] = 4.0, notch: Annotated[float, SAMPLE] = 1.0,
+                      notch_width: Annotated[float, SAMPLE] = 0.1, mesh: Annotated[str, SAMPLE] = "M3",
+                      mesh_seed: Annotated[int, SAMPLE] = 0, options: Options = Options()) -> Result:  # noqa: B008
     """Pull a square plate with an edge notch apart, slowly, and watch the crack.
 
     The grips at the top and bottom edge move apart at `speed` each and hold the plate sideways. The plate is loaded
@@ -49,25 +51,28 @@ def single_edge_notch(*, side: float = 4.0, notch: float = 1.0, notch_width: flo
     Result
         Summary, history and last state; its files are in the output folder.
     """
-    require("side", side, "mm", low=0, low_open=True)
-    require("notch-width", notch_width, "mm", low=0, high=side, low_open=True, high_open=True)
-    require("notch", notch, "mm", low=notch_width / 2, high=side, low_open=True, high_open=True)
-    require("mesh-seed", mesh_seed, low=0)
     own = {"side": side, "notch": notch, "notch_width": notch_width, "mesh": mesh, "mesh_seed": mesh_seed}
-    return run_case("single_edge_notch", _scene, own, options)
+    return run_case(single_edge_notch, _scene, own, options)
 
 
 def _scene(own: dict[str, Any], options: Options) -> Scene:
-    name, seed = str(own["mesh"]), int(own["mesh_seed"])
-    lengths = {k: float(own[k]) for k in ("side", "notch", "notch_width")}
+    name = str(own["mesh"])
+    side = require("side", own["side"], "mm", low=0, low_open=True)
+    width = require("notch-width", own["notch_width"], "mm", low=0, high=side, low_open=True, high_open=True)
+    notch = require("notch", own["notch"], "mm", low=width / 2, high=side, low_open=True, high_open=True)
+    seed = int(require("mesh-seed", own["mesh_seed"], low=0, whole=True))
     make = None
-    if name in MESHES and (seed or lengths != {"side": 4.0, "notch": 1.0, "notch_width": 0.1}):
+    if seed or (side, notch, width) != (4.0, 1.0, 0.1):
+        if Path(name).suffix:
+            raise ParameterError(f"side, notch, notch-width and mesh-seed are for the meshes {', '.join(MESHES)}; "
+                                 f"the mesh file {name} is as it is")
+
         def make() -> Any:
-            return single_edge_notch_mesh(**lengths, **MESHES[name], seed=seed)
+            return single_edge_notch_mesh(side=side, notch=notch, notch_width=width, **MESHES[name], seed=seed)
     speed = options.speed
     return Scene(
         case="single_edge_notch", title="Single-edge notched plate", parameters={**own, **options.parameters()},
-        sample=load_sample("single_edge_notch", name, make), material=options.material(),
+        sample=load_sample("single_edge_notch", name, make if name in MESHES else None), material=options.material(),
         sink_law=options.sink_law(), grips=(Grip("top", (0.0, speed)), Grip("bottom", (0.0, -speed))),
         notch=("notch",), controls=options.controls(), assumed=ASSUMED)
 

@@ -1,0 +1,99 @@
+"""A small notched plate, and runs of it by the command line: in this process, or in one that is killed."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import os
+import signal
+import traceback
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import meshio
+import numpy as np
+
+from skfsink.cases.single_edge_notch import single_edge_notch
+from skfsink.cli import command
+
+SMALL = ["--length-scale", "0.6", "--hht-dt", "5e-7", "--quiet"]  # for the elements of 0.3 mm of `plate()`
+
+
+def plate(n: int = 13, side: float = 4.0, notch: float = 1.0) -> meshio.Mesh:
+    """Square plate of n x n slightly distorted quads (n odd) without those of the middle row up to x = `notch`."""
+    x, y = np.meshgrid(*[np.linspace(0, side, n + 1)] * 2, indexing="ij")
+    points = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
+    first = (np.arange(n)[:, None] * (n + 1) + np.arange(n)).ravel()
+    quads = first[:, None] + np.array([0, n + 1, n + 2, 1])
+    middle = points[quads].mean(axis=1)
+    quads = quads[(middle[:, 0] > notch) | (np.abs(middle[:, 1] - side / 2) > 0.51 * side / n)]
+    used, quads = np.unique(quads, return_inverse=True)
+    points, quads = points[used], quads.reshape(-1, 4)
+    edges, count = np.unique(np.sort(quads[:, [[0, 1], [1, 2], [2, 3], [3, 0]]].reshape(-1, 2), axis=1), axis=0,
+                             return_counts=True)
+    lines = edges[count == 1]
+    x, y, _ = points[lines].mean(axis=1).T
+    sets = {"top": y == side, "bottom": y == 0, "left": x == 0, "right": x == side}
+    sets["notch"] = ~np.any([*sets.values()], axis=0)
+    inside = np.setdiff1d(np.arange(len(points)), lines)
+    points[inside, :2] += np.random.default_rng(0).uniform(-0.2, 0.2, (len(inside), 2)) * side / n
+    return meshio.Mesh(points, [("quad", quads), ("line", lines)],
+                       cell_sets={name: [np.zeros(0, int), np.flatnonzero(mask)] for name, mask in sets.items()})
+
+
+def invoke(*arguments: object) -> tuple[Any, str, str]:
+    """Exit status, stderr and stdout of the command line; an exception it lets through is the caller's."""
+    out, err = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        try:
+            command(single_edge_notch, [str(a) for a in arguments])
+        except SystemExit as end:
+            return end.code, err.getvalue(), out.getvalue()
+
+
+def forked(arguments: Sequence[object], stop: int = 0, number: signal.Signals = signal.SIGKILL) -> tuple[int, str]:
+    """Exit status and stderr of the command line in a child process.
+
+    The child sends itself the signal `number` at the `stop`-th operation on a file (0: never): before a sync, a
+    replacement or a removal, and between the two syncs that a replacement takes.
+    """
+    read, write = os.pipe()
+    if (child := os.fork()) == 0:
+        status, text, done = 99, "", 0
+
+        def counted(operation: Any) -> Any:
+            def wrapper(*args: Any, **kwargs: Any) -> Any:
+                nonlocal done
+                done += 1
+                if done == stop:
+                    os.kill(os.getpid(), number)
+                return operation(*args, **kwargs)
+            return wrapper
+
+        for name in ("fsync", "replace", "unlink"):
+            setattr(os, name, counted(getattr(os, name)))
+        try:
+            status, text, _ = invoke(*arguments)
+        except BaseException:
+            text = traceback.format_exc()
+        os.write(write, text.encode()[:60000])
+        os._exit(status)
+    os.close(write)
+    with os.fdopen(read, "rb") as pipe:
+        text = pipe.read().decode()
+    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), text
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    """Every file below a folder."""
+    return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
+
+
+def figures(folder: Path) -> dict[str, Any]:
+    """The summary of a run without what depends on the machine."""
+    summary: dict[str, Any] = json.loads((folder / "summary.json").read_text())
+    for part in (summary, summary.get("dynamic", {}), summary.get("quasistatic", {})):
+        part.pop("cost", None), part.pop("versions", None)
+    return summary

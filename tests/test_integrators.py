@@ -1,0 +1,135 @@
+"""Order, ledger, rejection of steps, and exact continuation of the two time integrators."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from bodies import Fracture, box, ends
+
+from skfsink.density import DensitySolver
+from skfsink.explicit import Explicit, ExplicitControls
+from skfsink.hht import HHT, HHTControls
+from skfsink.material import AAA, SinkLaw
+from skfsink.momentum import Momentum
+from skfsink.state import State
+
+EXACT = {"force_tolerance": 1e-9, "correction_tolerance": 1e-9, "max_iterations": 30}
+
+
+def swinging(kind: str, steps: int, integrator: str, alpha: float = 0.0, end: float = 2e-5) -> State:
+    """A smooth elastic swing of a coarse body, clamped at one end and let go, after `steps` equal steps."""
+    space = box(kind, 3 if kind == "quad" else 2, 0.2)
+    momentum, density = Momentum(space, AAA(bulk_modulus=5.0)), DensitySolver(space, SinkLaw(phi=1e3))
+    free, still = np.repeat(~ends(space)[0], space.dim), np.zeros_like(space.X)
+    state = State.intact(space)
+    x, y = space.X[:, 0], space.X[:, 1]
+    state.u[:, 0] = 0.05 * np.sin(np.pi * y / 2)
+    state.u[:, 1] = 0.025 * np.sin(np.pi * y / 2) * x
+    if integrator == "explicit":
+        scheme = Explicit(momentum, density, free, still, ExplicitControls(gamma_every=10))
+        scheme._set_step = lambda state: None
+        scheme._mode, scheme.dt = np.zeros(1), end / steps
+    else:
+        scheme = HHT(momentum, density, free, still, HHTControls(alpha=alpha, dt=end / steps, **EXACT))
+    scheme.begin(state)
+    for _ in range(steps):
+        scheme.step(state)
+    assert state.time == pytest.approx(end, rel=1e-12)
+    assert integrator == "explicit" or scheme.rejected == 0
+    return state
+
+
+@pytest.mark.parametrize(("integrator", "alpha"), [("explicit", 0.0), ("hht", 0.0), ("hht", -0.05), ("hht", -1 / 3)])
+def test_second_order_in_time(kind: str, integrator: str, alpha: float):
+    """Fails if a scheme loses its order: self-convergence of displacement and velocity, 1.9 to 2.1.
+
+    Without damage, alpha = 0 and explicit steps keep the energy up to terms of second order; the ledger books these,
+    and what HHT damps, as numerical, and closes to rounding.
+    """
+    states = [swinging(kind, n, integrator, alpha) for n in (40, 80, 160)]
+    for field in ("u", "v"):
+        a, b, c = (getattr(s, field) for s in states)
+        order = np.log2(np.linalg.norm(a - b) / np.linalg.norm(b - c))
+        assert 1.9 < order < 2.1, (field, order)
+    for s in states:
+        assert abs(s.ledger.balance) <= 1e-12 * s.ledger.initial
+        assert s.ledger.kinetic > 0.05 * s.ledger.initial  # it does move
+    lost = np.abs([s.ledger.numerical / s.ledger.initial for s in states])
+    assert lost[2] < 0.3 * lost[1] or lost.max() < 1e-6
+    assert lost[0] < (6e-4 if integrator == "explicit" else 2e-5 if alpha == 0 else 4e-4)
+
+
+def recomputed(momentum: Momentum, state: State, mass: np.ndarray) -> tuple[float, float]:
+    """Elastic and kinetic energy of a state from scratch, by the formulas of the material."""
+    space = momentum.space
+    F = space.deformation_gradient(state.u)
+    J = np.linalg.det(F)
+    gamma = momentum.effective(state.gamma, state.deleted)
+    live = gamma > 0
+    W = np.zeros_like(J)
+    J_bar = np.broadcast_to(space.element_mean(J)[:, None], J.shape)
+    W[live] = momentum.material.energy(F[live], J_bar[live])
+    return float((space.w * gamma * W).sum()), 0.5 * float(mass @ (state.v**2).sum(axis=1))
+
+
+@pytest.mark.parametrize("gamma_every", [1, 7])
+def test_explicit_ledger_closes_through_a_fracture(fracture: Fracture, gamma_every: int):
+    """Fails if any entry of the ledger is wrong: the balance closes to 1e-10 of the initial energy while a crack runs.
+
+    Elastic and kinetic energy are recomputed from the state; the dissipation of the scheme, which it books from its
+    own identity, stays below 1 % and D takes both stored and kinetic energy.
+    """
+    fresh, momentum, density, free, velocity = fracture
+    state = fresh()
+    explicit = Explicit(momentum, density, free, velocity, ExplicitControls(gamma_every=gamma_every))
+    explicit.begin(state)
+    initial = state.ledger.initial
+    worst = 0.0
+    for _ in explicit.run(state, 4e-5):
+        worst = max(worst, abs(state.ledger.balance))
+        if state.step % 100 == 0:
+            elastic, kinetic = recomputed(momentum, state, explicit.mass)
+            assert state.ledger.elastic == pytest.approx(elastic, rel=1e-9)
+            assert state.ledger.kinetic == pytest.approx(kinetic, rel=1e-9)
+    ledger = state.ledger
+    assert worst <= 1e-10 * initial
+    assert state.deleted.sum() > 10 and len(state.deletions) == state.deleted.sum()
+    assert ledger.paper == pytest.approx(density.law.failure_energy * momentum.space.V[state.deleted].sum(), rel=1e-12)
+    assert 0.3 * initial < ledger.sink < initial
+    assert ledger.sink_stored > ledger.sink_kinetic > 0.05 * initial
+    assert 0 < abs(ledger.numerical) < 0.01 * initial
+    assert state.gamma.min() > 0 and state.gamma.max() <= 1 + 1e-9
+    times = [t for t, _ in state.deletions]
+    assert times == sorted(times)
+
+
+@pytest.mark.parametrize("coupling", ["single", "iterated"])
+def test_hht_ledger_closes_through_the_start_of_a_fracture(fracture: Fracture, coupling: str):
+    """Fails if an entry of the HHT ledger does not follow from the scheme: converged steps close to 1e-8."""
+    fresh, momentum, density, free, velocity = fracture
+    state = fresh()
+    hht = HHT(momentum, density, free, velocity, HHTControls(coupling=coupling, force_tolerance=1e-8,
+                                                            correction_tolerance=1e-8, gamma_tolerance=1e-7))
+    hht.begin(state)
+    for _ in hht.run(state, 6e-6):
+        assert abs(state.ledger.balance) <= 1e-8 * state.ledger.initial
+    elastic, kinetic = recomputed(momentum, state, momentum.lumped_mass(0.0))
+    assert state.ledger.elastic == pytest.approx(elastic, rel=1e-9)
+    assert state.ledger.kinetic == pytest.approx(kinetic, rel=1e-6)
+    assert state.ledger.sink > 1e-2 * state.ledger.initial and state.gamma.min() < 1e-3
+
+
+def test_integrators_agree_on_a_fracture(fracture: Fracture):
+    """Fails if one of them is wrong: the energies at 20 us agree to 10 % of the initial energy on this coarse mesh."""
+    fresh, momentum, density, free, velocity = fracture
+    ledgers = []
+    for make in (lambda: Explicit(momentum, density, free, velocity),
+                 lambda: HHT(momentum, density, free, velocity, HHTControls(dt=2e-7))):
+        state, scheme = fresh(), make()
+        scheme.begin(state)
+        for _ in scheme.run(state, 2e-5):
+            pass
+        ledgers.append(state.ledger)
+    for name in ("elastic", "kinetic", "sink", "sink_stored"):
+        a, b = (getattr(ledger, name) for ledger in ledgers)
+        assert a == pytest.approx(b, abs=0.1 * ledgers[0].initial), name

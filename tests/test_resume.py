@@ -1,0 +1,266 @@
+"""Runs that are killed or interrupted and go on to the same result; resumes that are refused and touch nothing."""
+
+from __future__ import annotations
+
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+import xml.etree.ElementTree as ET
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from plates import SMALL, contents, figures, forked, invoke, plate
+
+import skfsink.checkpoint
+import skfsink.run
+from skfsink.meshing import write_mesh
+from skfsink.output import History
+
+RUNS = {"explicit": [], "consistent": ["--sink", "consistent", "--event-time", "4e-5"],
+        "hht": ["--integrator", "hht", "--event-time", "3e-5"], "quasistatic": ["--analysis", "quasistatic"],
+        "both": ["--analysis", "both", "--event-time", "6e-5"]}
+
+
+@pytest.fixture(scope="module")
+def mesh(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """File of the small plate."""
+    path = tmp_path_factory.mktemp("mesh") / "plate.vtu"
+    write_mesh(path, plate())
+    return path
+
+
+@pytest.fixture
+def plain(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave out the pictures."""
+    monkeypatch.setattr(skfsink.run, "draw_run", lambda *_: None)
+    monkeypatch.setattr(skfsink.run, "draw_comparison", lambda *_: None)
+
+
+def histories(folder: Path) -> dict[str, bytes]:
+    """The histories below a folder, and the other tables."""
+    return {name: content for name, content in contents(folder).items() if name.endswith(".csv")}
+
+
+def check_readable(folder: Path) -> None:
+    """What a killed run has left can be read: whole rows, and no frame is named that is not there."""
+    for path in folder.rglob("history.csv"):
+        assert History.load(path)
+    for path in folder.rglob("run.pvd"):
+        for entry in ET.parse(path).iter("DataSet"):
+            assert (path.parent / entry.attrib["file"]).is_file()
+
+
+# --- the same twice, and the same after kills ---
+@pytest.mark.parametrize("kind", RUNS)
+def test_killed_runs_end_the_same(kind: str, mesh: Path, tmp_path: Path, plain: None) -> None:
+    """Fails if anything a step depends on is not in the checkpoint, or a file is at any moment a part of itself.
+
+    The kills come at the operations on files, in all phases, many times in a row.
+    """
+    arguments = ["--mesh", mesh, "--checkpoint-every", "0.05", *SMALL, *RUNS[kind]]
+    for name in ("one", "two"):
+        assert forked([*arguments, "--out", tmp_path / name]) == (0, "")
+    assert histories(tmp_path / "one") == histories(tmp_path / "two")
+    dice, kills = random.Random(kind), 0
+    for trial in range(3):
+        out = tmp_path / f"killed{trial}"
+        for _ in range(12):
+            go_on = ["--resume", out, "--quiet"] if (out / "scene.toml").exists() else [*arguments, "--out", out,
+                                                                                      "--overwrite"]
+            status, text = forked(go_on, stop=dice.randint(1, 40))
+            assert (status, text) in ((0, ""), (-9, "")), text
+            check_readable(out)
+            kills += status == -9
+            if status == 0:
+                break
+        else:
+            assert forked(["--resume", out, "--quiet"]) == (0, "")
+        assert histories(out) == histories(tmp_path / "one")
+        assert figures(out) == figures(tmp_path / "one")
+    assert kills > 5
+
+
+@pytest.mark.parametrize("kind", ["explicit", "quasistatic", "hht", "both"])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_interrupted_runs_say_how_to_go_on(kind: str, number: signal.Signals, mesh: Path, tmp_path: Path,
+                                           plain: None) -> None:
+    """Fails if a signal is lost, ends a run without a checkpoint, or if the line names the wrong folder."""
+    out = tmp_path / "my runs" / "out"
+    arguments = ["--mesh", mesh, "--checkpoint-every", "0.02", *SMALL, *RUNS[kind]]
+    assert forked([*arguments, "--out", tmp_path / "whole"]) == (0, "")
+    go_on, stops = [*arguments, "--out", out], 0
+    for stop in (24, 8, 8, 40):  # in the loading, soon after a resume, later
+        status, text = forked(go_on, stop, number)
+        if status == 0:
+            break
+        assert (status, text) == (130, f"skfsink: interrupted; go on with --resume '{out}'\n")
+        check_readable(out)
+        go_on, stops = ["--resume", out, "--quiet"], stops + 1
+    assert stops >= 2
+    assert forked(["--resume", out, "--quiet"]) == (0, "")
+    assert histories(out) == histories(tmp_path / "whole") and figures(out) == figures(tmp_path / "whole")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_interrupted_while_drawing(number: signal.Signals, mesh: Path, tmp_path: Path, plain: None,
+                                   monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fails if a signal outside of the stepping is a traceback, or a kill without a word."""
+    out = tmp_path / "out"
+    monkeypatch.setattr(skfsink.run, "draw_run", lambda *_: os.kill(os.getpid(), number))
+    arguments = ["--mesh", mesh, "--out", out, "--event-time", "1e-6", *SMALL]
+    assert forked(arguments) == (130, f"skfsink: interrupted; go on with --resume {out}\n")
+    monkeypatch.setattr(skfsink.run, "draw_run", lambda *_: None)
+    assert forked(["--resume", out, "--quiet"]) == (0, "") and figures(out)["event"]["duration_s"] >= 1e-6
+
+
+def test_resuming_a_finished_run_draws_it_again(mesh: Path, tmp_path: Path, plain: None) -> None:
+    """Fails if a finished run is stepped on, recorded twice, or refused."""
+    out = tmp_path / "out"
+    assert invoke("--mesh", mesh, "--out", out, *SMALL, *RUNS["explicit"])[0] == 0
+    before, summary = contents(out), figures(out)
+    assert invoke("--resume", out, "--quiet")[:2] == (0, "")
+    after = contents(out)
+    for files in (before, after):  # they hold wall times
+        files.pop("checkpoint.npz"), files.pop("summary.json")
+    assert before == after and figures(out) == summary
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["explicit", "quasistatic", "both"])
+def test_processes_killed_by_the_clock(kind: str, mesh: Path, tmp_path: Path) -> None:
+    """Fails as `test_killed_runs_end_the_same` does, but for real: kills at any moment, with pictures."""
+    arguments = ["--mesh", mesh, "--checkpoint-every", "0.2", *SMALL, *RUNS[kind]]
+    program = [sys.executable, "-m", "skfsink.cases.single_edge_notch"]
+    assert invoke(*arguments, "--out", tmp_path / "whole")[0] == 0
+    out, dice = tmp_path / "out", random.Random(kind)
+    for attempt in range(8):
+        go_on = ["--resume", out, "--quiet"] if (out / "scene.toml").exists() else [*arguments, "--out", out,
+                                                                                  "--overwrite"]
+        process = subprocess.Popen([*program, *map(str, go_on)], stderr=subprocess.PIPE, text=True)
+        try:
+            process.wait(timeout=None if attempt == 7 else dice.uniform(2.5, 9))
+            assert (process.returncode, process.stderr.read() if process.stderr else "") == (0, "")
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+        time.sleep(0.05)
+        if out.exists():
+            check_readable(out)
+    assert histories(out) == histories(tmp_path / "whole") and figures(out) == figures(tmp_path / "whole")
+    assert {*contents(out)} == {*contents(tmp_path / "whole")}
+
+
+# --- refusals ---
+@pytest.fixture(scope="module")
+def stopped(mesh: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with its own `plate.vtu`, and runs stopped in the event: `run`, `both` (in the second part), `other`."""
+    top = tmp_path_factory.mktemp("stopped")
+    shutil.copy(mesh, top)
+    short = ["--mesh", top / "plate.vtu", *SMALL, "--event-time", "1e-5", "--checkpoint-every", "1e-9"]
+    assert forked([*short, "--out", top / "run"], 100)[0] == -9
+    assert forked([*short, "--out", top / "other", "--phi", "0.2"], 100)[0] == -9
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(skfsink.run, "draw_run", lambda *_: None)
+        assert forked([*short, "--out", top / "both", "--analysis", "both"], 205)[0] == -9
+    assert (top / "both" / "quasistatic" / "checkpoint.npz").exists()
+    return top
+
+
+def cut(path: Path, share: float) -> None:
+    """Truncate a file."""
+    os.truncate(path, int(path.stat().st_size * share))
+
+
+def edit(path: Path, old: str, new: str) -> None:
+    """Replace text that is there."""
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
+
+
+def other_mesh(top: Path) -> None:
+    """As many nodes, one elsewhere."""
+    mesh = plate()
+    mesh.points[30, 0] += 1e-9
+    write_mesh(top / "plate.vtu", mesh)
+
+
+SPOILT: dict[str, tuple[Callable[[Path], object], str]] = {
+    "no scene": (lambda top: (top / "run/scene.toml").unlink(), "scene.toml"),
+    "no folder": (lambda top: shutil.rmtree(top / "run"), "scene.toml"),
+    "no checkpoint": (lambda top: (top / "run/checkpoint.npz").unlink(), "no checkpoint"),
+    "cut checkpoint": (lambda top: cut(top / "run/checkpoint.npz", 0.7), "damaged"),
+    "empty checkpoint": (lambda top: cut(top / "run/checkpoint.npz", 0), "damaged"),
+    "garbage": (lambda top: (top / "run/checkpoint.npz").write_bytes(bytes(range(256)) * 99), "damaged"),
+    "foreign npz": (lambda top: np.savez(top / "run/checkpoint.npz", u=np.ones(3)), "damaged"),
+    "bare state": (lambda top: shutil.copy(top / "run/onset.npz", top / "run/checkpoint.npz"), "damaged"),
+    "other's": (lambda top: shutil.copy(top / "other/checkpoint.npz", top / "run/checkpoint.npz"), "another scene"),
+    "edited": (lambda top: edit(top / "run/scene.toml", "phi = 0.1686", "phi = 0.17"), "another scene"),
+    "other case": (lambda top: edit(top / "run/scene.toml", '"single_edge_notch"', '"trousers"'), "trousers"),
+    "no toml": (lambda top: edit(top / "run/scene.toml", "phi = ", "phi : "), "scene.toml"),
+    "bytes": (lambda top: (top / "run/scene.toml").write_bytes(b"\xff\xfe\x00" * 50), "scene.toml"),
+    "left out": (lambda top: edit(top / "run/scene.toml", "phi = 0.1686\n", ""), "phi"),
+    "too much": (lambda top: edit(top / "run/scene.toml", "phi = ", "psi = 1\nphi = "), "psi"),
+    "out of range": (lambda top: edit(top / "run/scene.toml", "phi = 0", "phi = -0"), "(0, inf) MPa"),
+    "text": (lambda top: edit(top / "run/scene.toml", "side = 4.0", 'side = "wide"'), "'wide'"),
+    "list": (lambda top: edit(top / "run/scene.toml", "phi = 0.1686", "phi = [1, 2]"), "(0, inf) MPa"),
+    "other mesh": (other_mesh, "another scene"),
+    "no mesh": (lambda top: (top / "plate.vtu").unlink(), "no mesh file"),
+    "no series": (lambda top: shutil.rmtree(top / "run/series"), "run.pvd"),
+    "no frame": (lambda top: (top / "run/series/run_0000.vtu").unlink(), "of the 2 frames"),
+    "cut pvd": (lambda top: cut(top / "run/series/run.pvd", 0.5), "run.pvd"),
+    "both, no checkpoint": (lambda top: (top / "both/dynamic/checkpoint.npz").unlink(), "no checkpoint"),
+    "both, garbage": (lambda top: (top / "both/quasistatic/checkpoint.npz").write_text("!"), "quasistatic"),
+    "both, no onset": (lambda top: (top / "both/dynamic/onset.npz").unlink(), "onset.npz"),
+}
+
+
+@pytest.mark.parametrize("name", SPOILT)
+def test_spoilt_runs_are_refused(name: str, stopped: Path, tmp_path: Path) -> None:
+    """Fails if a resume goes on from what does not belong together, or writes before it has looked."""
+    shutil.copytree(stopped, tmp_path, dirs_exist_ok=True)
+    for path in tmp_path.rglob("scene.toml"):
+        edit(path, str(stopped), str(tmp_path))
+    spoil, part = SPOILT[name]
+    spoil(tmp_path)
+    refused(tmp_path, part, "--resume", tmp_path / ("both" if name.startswith("both") else "run"))
+
+
+def refused(top: Path, part: str, *arguments: object) -> None:
+    """One line with `part` in it, exit status 2, and every file as it was."""
+    before = contents(top)
+    status, err, out = invoke(*arguments)
+    assert (status, out, err.count("\n")) == (2, "", 1) and err.startswith("skfsink: ") and part in err, err
+    assert contents(top) == before
+
+
+@pytest.mark.parametrize("arguments, part", [
+    (["--phi", "0.17"], "--phi 0.17"), (["--length-scale", "0.1"], "--length-scale 0.1"), (["--side", "5"], "--side 5"),
+    (["--mesh", "M3"], "--mesh M3"), (["--mesh", "plate.vtu"], "--mesh "), (["--threads", "2"], "--threads 2"),
+    (["--analysis", "both"], "--analysis both"), (["--out", "elsewhere"], "--out elsewhere"), (["--phi", "-1"], "-1")])
+def test_parameters_beside_resume_must_agree(arguments: list[str], part: str, stopped: Path) -> None:
+    """Fails if a parameter given beside --resume, even one at its default, is dropped or used without a word."""
+    refused(stopped, part, "--resume", stopped / "run", *arguments)
+
+
+def test_checkpoint_of_another_version(stopped: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fails if a checkpoint whose meaning may have changed is read."""
+    monkeypatch.setattr(skfsink.checkpoint, "__version__", "0.0.9")
+    refused(stopped, "0.0.9", "--resume", stopped / "run")
+
+
+def test_equal_parameters_beside_resume_and_any_working_folder(stopped: Path, tmp_path: Path, plain: None,
+                                                               monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fails if parameters that agree are refused, or if a run finds its mesh only from where it was started."""
+    monkeypatch.chdir(tmp_path)
+    for kind in ("run", "both"):
+        shutil.copytree(stopped / kind, tmp_path / kind)
+        status, text = forked(["--resume", kind, "--length-scale", "0.6", "--phi", "0.1686", "--side", "4", "--mesh",
+                               stopped / "plate.vtu", "--out", tmp_path / kind])
+        assert status == 0 and (tmp_path / kind / "summary.json").exists(), text

@@ -1,0 +1,159 @@
+"""Steps that are refused, steps over ten decades, and runs that go on from a checkpoint to the same bits."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from bodies import Fracture, grips, notched
+
+from skfsink.density import DensitySolver
+from skfsink.errors import ConvergenceError, InstabilityError
+from skfsink.explicit import Explicit, ExplicitControls
+from skfsink.hht import HHT, HHTControls
+from skfsink.material import AAA, SinkLaw
+from skfsink.momentum import Momentum
+from skfsink.state import State
+
+MAKERS: dict[str, Callable] = {
+    "explicit": lambda *args: Explicit(*args, ExplicitControls(gamma_every=4)),
+    "explicit, interval of gamma by itself": lambda *args: Explicit(*args),
+    "hht": lambda *args: HHT(*args, HHTControls(dt=2e-7)),
+    "hht, single pass": lambda *args: HHT(*args, HHTControls(dt=2e-7, coupling="single")),
+}
+
+
+@pytest.mark.parametrize("name", MAKERS)
+@pytest.mark.parametrize("before", [13, 120])
+def test_run_continues_to_the_same_bits(fracture: Fracture, name: str, before: int):
+    """Fails if a checkpoint misses anything: state and memory taken between density solves, in a running crack."""
+    fresh, momentum, _, free, velocity = fracture
+
+    def scheme() -> Explicit | HHT:
+        return MAKERS[name](Momentum(momentum.space, momentum.material),
+                            DensitySolver(momentum.space, SinkLaw()), free, velocity)
+
+    one, state = scheme(), fresh()
+    one.begin(state)
+    for _ in range(before):
+        one.step(state)
+    one.sync(state)
+    saved = copy.deepcopy((state, one.memory(), one.density.memory()))
+    for _ in range(40):
+        one.step(state)
+    two = scheme()
+    resumed, memory, density_memory = saved
+    two.density.restore(density_memory)
+    two.restore(resumed, memory)
+    for _ in range(40):
+        two.step(resumed)
+    one.sync(state)
+    two.sync(resumed)
+    assert state.gamma.min() < 0.5
+    for field in ("u", "v", "a", "gamma", "W_max", "deleted"):
+        np.testing.assert_array_equal(getattr(state, field), getattr(resumed, field), err_msg=field)
+    assert (state.time, state.step, state.grip, state.deletions) == \
+        (resumed.time, resumed.step, resumed.grip, resumed.deletions)
+    assert state.ledger == resumed.ledger
+    np.testing.assert_array_equal(one.reaction, two.reaction)
+    assert one.dt == two.dt
+
+
+def test_explicit_says_when_it_has_blown_up(fracture: Fracture):
+    """Fails if a run with too long a step goes on with infinite energies."""
+    fresh, momentum, density, free, velocity = fracture
+    state = fresh()
+    explicit = Explicit(momentum, density, free, velocity, ExplicitControls(gamma_every=10**6))
+    explicit.begin(state)
+    explicit._set_step(state)
+    explicit.dt *= 1.5
+    explicit._set_step = lambda state: None
+    with pytest.raises(InstabilityError, match=r"blew up .* lower courant"), np.errstate(all="ignore"):
+        for _ in explicit.run(state, 1.0):
+            assert state.step <= 400
+
+
+def test_step_follows_the_deformed_state():
+    """Fails if the explicit step stays that of the undeformed body when a strong stretch flattens the elements."""
+    space = notched(9, notch=-1.0)  # no notch
+    free, still = grips(space, 0.0)
+    steps = []
+    for stretch in (1.0, 1.6):
+        momentum, density = Momentum(space, AAA()), DensitySolver(space, SinkLaw(phi=1e6))
+        state = State.intact(space)
+        state.u = space.X * (np.array([1 / stretch, stretch]) - 1)
+        explicit = Explicit(momentum, density, free, still)
+        explicit.begin(state)
+        explicit.step(state)
+        steps.append(explicit.dt)
+    assert steps[1] < 0.8 * steps[0]
+
+
+@pytest.mark.parametrize("dt", [1e-6, 1e-5])
+def test_hht_refuses_steps_that_are_too_long(fracture: Fracture, dt: float):
+    """Fails if a far too long step through a running crack is taken as it comes, or leaves unsound fields."""
+    fresh, momentum, density, free, velocity = fracture
+    state = fresh()
+    hht = HHT(momentum, density, free, velocity, HHTControls(dt=dt))
+    hht.begin(state)
+    for _ in hht.run(state, 3e-5):
+        pass
+    assert hht.rejected >= 1
+    assert state.gamma.min() > 0 and state.gamma.max() <= 1 + 1e-9
+    assert np.isfinite(state.u).all() and np.isfinite(state.v).all()
+    live = momentum.space.lump(momentum.gamma) > 1e-3 * density.load
+    assert np.abs(state.u[live]).max() < 0.2  # mm; the body is 1 mm high, the grips are 0.1 mm apart
+    assert 0.1 * state.ledger.initial < state.ledger.sink < state.ledger.initial
+    assert 5 <= state.deleted.sum() < 60
+
+
+def test_hht_gives_up_with_a_reason(fracture: Fracture):
+    """Fails if a step that never converges loops for ever, or leaves a changed state behind."""
+    fresh, momentum, density, free, velocity = fracture
+    state = fresh()
+    hht = HHT(momentum, density, free, velocity, HHTControls(dt=1e-6, dt_least=9e-7, max_iterations=3,
+                                                            force_tolerance=1e-14))
+    hht.begin(state)
+    u = state.u.copy()
+    with pytest.raises(ConvergenceError, match="the implicit integration stalled at t = 0 s"):
+        hht.step(state)
+    np.testing.assert_array_equal(state.u, u)
+    assert state.step == 0 and hht.rejected == 1
+
+
+@pytest.mark.xfail(strict=True, reason="nodes without mass leap by millimetres in an HHT step for want of a mass "
+                                       "floor, and the ledger misses up to 0.2 of the initial energy")
+def test_nodes_that_lost_their_mass_stay_near_the_body(fracture: Fracture):
+    """Fails if nodes without mass are thrown about by Newton's method: they stay within an element of the body."""
+    fresh, momentum, density, free, velocity = fracture
+    state = fresh()
+    hht = HHT(momentum, density, free, velocity, HHTControls(dt=2e-7))
+    hht.begin(state)
+    for _ in hht.run(state, 4e-5):
+        assert np.abs(state.u).max() < 0.3
+    assert abs(state.ledger.balance) <= 1e-3 * state.ledger.initial
+
+
+@pytest.mark.xfail(strict=True, reason="HHT measures its residual against the force on the free nodes, which vanishes "
+                                       "in slow loading, and predicts with an acceleration that is noise there")
+@pytest.mark.parametrize("speed", [1e-3, 1e-9])
+def test_hht_steps_grow_over_ten_decades(speed: float):
+    """Fails if slow loading cannot be followed with inertia: from 1e-8 s steps grow to a twentieth of the loading time.
+
+    Below the onset the body is elastic: the work of the grips is stored, but for rounding and what HHT damps.
+    """
+    space = notched(9)
+    momentum, density = Momentum(space, AAA()), DensitySolver(space, SinkLaw())
+    free, velocity = grips(space, speed)
+    state = State.intact(space)
+    duration = 0.02 / speed
+    hht = HHT(momentum, density, free, velocity, HHTControls(dt=duration / 20, dt_first=1e-8))
+    hht.begin(state)
+    for _ in hht.run(state, duration):
+        assert state.step < 300 and hht.rejected < 50
+    assert hht.dt == duration / 20
+    ledger = state.ledger
+    assert ledger.elastic == pytest.approx(ledger.work, rel=1e-4) and ledger.elastic > 1e-3
+    assert ledger.kinetic < 1e-6 * ledger.elastic
