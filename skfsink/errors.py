@@ -54,7 +54,7 @@ def require(name: str, value: float, unit: str = "", *, low: float = -math.inf, 
     kind = "whole" if whole else "finite"
     allowed = f"{name} must be a {kind} number in {left}, {right}" + (f" {unit}" if unit else "")
     try:
-        number = math.nan if isinstance(value, str) else float(value)
+        number = math.nan if isinstance(value, str | bytes) else float(value)
     except (TypeError, ValueError, OverflowError):
         number = math.nan
     too_low = number <= low if low_open else number < low

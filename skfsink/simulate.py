@@ -50,7 +50,8 @@ class Simulation:
         # a checkpoint that cannot be used is refused before any file is touched
         stored = load_checkpoint(folder / self.CHECKPOINT, scene.fingerprint) if resume else None
         if stored and "recorder" not in stored[2]:
-            raise CheckpointError(f"the checkpoint {folder / self.CHECKPOINT} is damaged: it is a state without its run")
+            path = folder / self.CHECKPOINT
+            raise CheckpointError(f"the checkpoint {path} is damaged: it is a state without its run")
         self.scene, self.folder, self.display = scene, folder, display
         c, space = scene.controls, scene.sample.space
         self.free, self.grip_velocity = scene.constraints()

@@ -145,3 +145,25 @@ def test_hht_damps_one_mode_as_predicted(alpha: float, z: float, mass: str):
         assert energy == pytest.approx(1, abs=1e-3)
     else:
         assert energy < 1 and state.ledger.numerical == pytest.approx(state.ledger.initial * (1 - energy), rel=1e-6)
+
+
+def test_points_below_the_floor_are_gone(kind: str):
+    """Fails if Gauss points below the force floor, or in deleted elements, still bear force, energy or mass.
+
+    Stiffness without mass would bring the stable step down; mass keeps its own floor.
+    """
+    space = box(kind, 4, 0.2)
+    momentum = Momentum(space, AAA(), force_floor=1e-2)
+    gamma, deleted = np.full(space.n_nodes, 0.5), np.zeros(space.n_elements, bool)
+    gamma[space.conn[0]] = 0.009
+    deleted[-1] = True
+    momentum.set_gamma(gamma, deleted)
+    seen = momentum.gamma
+    raw = space.at_gauss(gamma)
+    assert (seen[0] == 0).all() and (seen[-1] == 0).all()
+    live = (raw >= 1e-2) & ~deleted[:, None]
+    np.testing.assert_array_equal(seen[live], raw[live])
+    assert not seen[~live].any() and ((raw > 0) & ~live).any()
+    momentum.force(space.X * 0.1)
+    assert momentum.energy == pytest.approx(float((space.w * seen * momentum.W).sum()), rel=1e-12)
+    np.testing.assert_allclose(momentum.lumped_mass(0.0), momentum.material.rho0 * space.lump(seen), rtol=1e-14)

@@ -1,0 +1,134 @@
+"""What defines a run: `scene.toml` makes it again, its fingerprint tells it from others, its grips hold."""
+
+from __future__ import annotations
+
+import inspect
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from plates import SMALL, invoke, plate
+
+import skfsink.run
+from skfsink.cases.single_edge_notch import _scene, single_edge_notch
+from skfsink.errors import MeshError, OutputError, ParameterError, require
+from skfsink.meshing import write_mesh
+from skfsink.options import Options
+from skfsink.scene import Grip, Scene, read_parameters
+
+OWN = {name: p.default for name, p in inspect.signature(single_edge_notch).parameters.items() if name != "options"}
+
+
+@pytest.fixture
+def mesh(tmp_path: Path) -> Path:
+    """File of the small plate."""
+    write_mesh(tmp_path / "plate.vtu", plate())
+    return tmp_path / "plate.vtu"
+
+
+def scene(mesh: Path, **options: Any) -> Scene:
+    """The case on that mesh."""
+    return _scene({**OWN, "mesh": str(mesh)}, Options(**options))
+
+
+@pytest.mark.parametrize("arguments", [["--event-time", "2e-5", "--phi", "0.2"], ["--analysis", "quasistatic"],
+                                       ["--integrator", "hht", "--event-time", "5e-6", "--sink", "nearest"]])
+def test_scene_file_is_enough_to_run_again(arguments: list[str], mesh: Path, tmp_path: Path,
+                                           monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fails if a parameter that decides the result is missing from scene.toml, or loses a bit in it."""
+    monkeypatch.setattr(skfsink.run, "draw_run", lambda *_: None)
+    monkeypatch.chdir(tmp_path)  # the mesh is given relative to it
+    assert invoke("--mesh", mesh.name, "--out", "first", *SMALL, *arguments)[0] == 0
+    parameters = tomllib.loads((tmp_path / "first" / "scene.toml").read_text())["parameters"]
+    assert parameters.keys() == OWN.keys() | Options().parameters().keys()
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    options = {name: value for name, value in parameters.items() if name not in OWN}
+    result = single_edge_notch(**{name: parameters[name] for name in OWN},
+                               options=Options(**options, out=Path("second"), quiet=True))
+    flags = [text for name, value in parameters.items() for text in (f"--{name.replace('_', '-')}", value)]
+    assert invoke(*flags, "--out", "third", "--quiet")[0] == 0
+    for name in ("history.csv", "scene.toml", "series/run.pvd"):
+        first = (tmp_path / "first" / name).read_bytes()
+        assert (result.folder / name).read_bytes() == first == (Path("third") / name).read_bytes()
+
+
+def test_fingerprint_tells_scenes_apart(mesh: Path, tmp_path: Path) -> None:
+    """Fails if a run could be resumed with another parameter or mesh, or not from another place."""
+    base = scene(mesh)
+    assert base.fingerprint == scene(mesh).fingerprint
+    others = [scene(mesh, **{name: value}) for name, value in Options(
+        c1=0.6, c2=1.2, bulk_modulus=501.0, phi=0.17, m=9.0, length_scale=0.11, density=1433.1, speed=2e-3,
+        mass_floor=0.0, analysis="quasistatic", integrator="hht", hht_alpha=0.0, hht_dt=1e-7, coupling="single", mass="consistent",
+        courant=0.7, gamma_every=1, sink="nearest", element="plain", overshoot=0.01, force_floor=0.0, deletion=1e-5,
+        force_floor=0.0, deletion=1e-5, event_time=1e-4, aftermath=0.0, record_every=2e-6, frame_every=1e-5,
+        balance_tolerance=0.1, threads=2, checkpoint_every=10.0).parameters().items()]
+    bodies = []
+    for change in (0, 1, 2):
+        body = plate(n=13 if change else 11)
+        body.points[30, 0] += 1e-12 if change == 1 else 0.0
+        if change == 2:
+            body.cell_sets["notch"][1] = body.cell_sets["notch"][1][1:-1]
+        write_mesh(tmp_path / f"{change}.vtu", body)
+        bodies.append(scene(tmp_path / f"{change}.vtu"))
+    marks = {s.fingerprint for s in (base, *others, *bodies, replace(base, case="other"))}
+    assert len(marks) == 1 + len(others) + len(bodies) + 1
+    (tmp_path / "copy").mkdir()
+    assert scene(Path(mesh.rename(tmp_path / "copy" / "moved.vtu"))).fingerprint == base.fingerprint
+
+
+def test_parts_are_the_scenes_of_single_runs(mesh: Path) -> None:
+    """Fails if the halves of `--analysis both` could not be resumed, or rerun, on their own."""
+    both = scene(mesh, analysis="both", phi=0.2)
+    for analysis in ("dynamic", "quasistatic"):
+        alone = scene(mesh, analysis=analysis, phi=0.2)
+        assert both.part(analysis).toml() == alone.toml() and both.part(analysis).controls == alone.controls
+        assert both.part(analysis).fingerprint == alone.fingerprint
+
+
+def test_grips_hold_and_move_their_boundaries(mesh: Path) -> None:
+    """Fails if a grip slips sideways, moves the wrong way, or holds a node of another boundary."""
+    made = scene(mesh, speed=0.25)
+    free, velocity = made.constraints()
+    y = made.sample.space.X[:, 1]
+    held = (y == 0) | (y == 4)
+    assert (free.reshape(-1, 2) == ~held[:, None]).all()
+    assert (velocity[:, 0] == 0).all() and (velocity[:, 1] == np.select([y == 0, y == 4], [-0.25, 0.25])).all()
+    assert made.speed == pytest.approx(0.5)
+    slips = replace(made, grips=(Grip("top", (None, 0.25)), Grip("bottom", (0.0, 0.0))))
+    assert slips.constraints()[0].reshape(-1, 2)[y == 4].tolist() == [[True, False]] * int((y == 4).sum())
+    assert slips.speed == pytest.approx(0.25)
+
+
+def test_boundaries_must_be_there(mesh: Path) -> None:
+    """Fails if a grip or a notch that the mesh does not know holds nothing, silently."""
+    made = scene(mesh)
+    for change in ({"grips": (Grip("lid", (0.0, 1.0)),)}, {"notch": ("slit",)}):
+        with pytest.raises(MeshError, match=r"mesh plate has no boundary '(lid|slit)'; it has bottom, left, notch"):
+            replace(made, **change)
+
+
+def test_numbers_from_numpy_and_python_write_the_same_scene(mesh: Path) -> None:
+    """Fails if a parameter study over an array cannot be written down."""
+    values = {"phi": np.float64(0.2), "gamma_every": np.int64(3), "c1": np.float32(0.5)}
+    plain = {"phi": 0.2, "gamma_every": 3, "c1": 0.5}
+    assert scene(mesh, **values).toml() == scene(mesh, **plain).toml()
+
+
+def test_scene_files_that_are_none(tmp_path: Path) -> None:
+    """Fails if a file that is no scene is read as one of no parameters."""
+    for text in ("", "case = 1", "case = 'single_edge_notch'", "case = 'single_edge_notch'\nparameters = 3", "= x"):
+        (tmp_path / "scene.toml").write_text(text)
+        with pytest.raises(OutputError, match=r"scene\.toml is not the scene of a run|holds a run of case"):
+            read_parameters(tmp_path, "single_edge_notch")
+
+
+@pytest.mark.parametrize("value", ["1", None, [1], 10**400, np.nan, -np.inf, 2.5, 7, b"1"])
+def test_require_takes_whole_numbers_only(value: Any) -> None:
+    """Fails if what is no number, or none in the range, passes for one or raises anything else."""
+    with pytest.raises(ParameterError, match=r"^count must be a whole number in \[1, 6\] steps; got "):
+        require("count", value, "steps", low=1, high=6, whole=True)
+    assert require("count", 6, low=1, high=6, whole=True) == require("count", np.float32(6.0), whole=True) == 6.0
