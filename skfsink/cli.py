@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 from collections.abc import Callable
@@ -17,7 +18,7 @@ from .simulate import Interrupted
 
 __all__ = ["command"]
 
-BAD_INPUT, INTERRUPTED = 2, 130
+UNEXPECTED, BAD_INPUT, INTERRUPTED = 1, 2, 130
 
 
 def command(function: Callable[..., Any], arguments: list[str] | None = None) -> NoReturn:
@@ -42,6 +43,11 @@ def command(function: Callable[..., Any], arguments: list[str] | None = None) ->
         _fail("interrupted", INTERRUPTED)
     except (SkfsinkError, CycloptsError) as error:
         _fail(str(error), BAD_INPUT)
+    except Exception as error:  # such as the overflow of an absurd parameter, or a mistake in the program
+        if "SKFSINK_DEBUG" in os.environ:
+            raise
+        first = (str(error).splitlines() or [""])[0]
+        _fail(f"{type(error).__name__}: {first} (the environment variable SKFSINK_DEBUG shows where)", UNEXPECTED)
     raise SystemExit(0)
 
 

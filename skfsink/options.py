@@ -83,9 +83,9 @@ class Options:
     courant
         Explicit step over the stability limit estimated for the deformed state, in (0, 1].
     gamma_every
-        Explicit steps between solves for γ, >= 1; 0 takes as many as fit in 0.03 l/c_s (0.1 µs).
+        Explicit steps between solves for γ, >= 0; 0 takes as many as fit in 0.03 l/c_s (0.1 µs), at most 20.
     mass_floor
-        Least lumped mass of a node in the explicit scheme, relative to the intact one, in [0, 1).
+        Least lumped mass of a node, relative to the intact one, in [0, 1).
     hht_alpha
         Damping parameter α of HHT, in [-1/3, 0].
     hht_dt
@@ -170,7 +170,8 @@ class Options:
             self.event_time, self.aftermath, self.record_every, self.frame_every, self.balance_tolerance,
             self.checkpoint_every,
             self.threads, ExplicitControls(self.courant, self.gamma_every, self.mass_floor),
-            HHTControls(self.hht_alpha, self.hht_dt, coupling=self.coupling, mass=self.mass))
+            HHTControls(self.hht_alpha, self.hht_dt, coupling=self.coupling, mass=self.mass,
+                        mass_floor=self.mass_floor))
 
     def parameters(self) -> dict[str, Any]:
         """The options that decide results, by name."""

@@ -13,11 +13,13 @@ import skfem
 from bodies import box, distorted, grid
 from scipy.sparse import csc_array, diags_array
 
+from skfsink.deletion import delete_failed
 from skfsink.density import DensitySolver
 from skfsink.errors import ConvergenceError, ParameterError
 from skfsink.material import SinkLaw
 from skfsink.meshing import read_mesh
 from skfsink.space import Space
+from skfsink.state import State
 
 COMMITTED = Path(__file__).resolve().parents[1] / "cases" / "single_edge_notch" / "meshes"
 LAW = SinkLaw()
@@ -137,7 +139,7 @@ def test_solve_is_left_out_when_the_history_has_not_changed(space: Space):
     other = DensitySolver(space, LAW)
     other.restore(solver.memory())  # as from a checkpoint
     assert other.solve(W, gamma) is gamma
-    W[0, 0] += 0.1 * LAW.phi
+    W.flat[W.argmax()] *= 1 + 1e-6  # a change in the sixth digit of H counts
     assert solver.solve(W, gamma) is not gamma
     assert (solver.solves, solver.skipped) == (2, 2)
 
@@ -215,6 +217,28 @@ def test_flat_hexes_are_found_out():
     W[space.n_elements // 2] = FAILED
     with pytest.raises(ConvergenceError, match=r"left \(0, 1\]: -.* so flat"):
         DensitySolver(space, LAW).solve(W, np.ones(space.n_nodes))
+
+
+def test_element_fails_when_every_gauss_point_is_spent(kind: str):
+    """Fails if an element is deleted by one spent point, or twice, or without its area in U or its entry in the log."""
+    space = box(kind, 3, 0.1)
+    state = State.intact(space)
+    whole, half = 2, 5
+    state.gamma[space.conn[whole]] = 1e-7
+    state.gamma[space.conn[half][:2]] = 0.0
+    spent = space.at_gauss(state.gamma) <= 0.3
+    assert spent[half].any() and not spent[half].all()
+    state.time = 3e-6
+    assert delete_failed(space, state, 0.3, 2.0).tolist() == [whole]
+    assert np.flatnonzero(state.deleted).tolist() == [whole]
+    assert state.deletions == [(3e-6, whole)]
+    assert state.ledger.paper == pytest.approx(2.0 * space.V[whole], rel=1e-14)
+    state.time = 4e-6
+    assert delete_failed(space, state, 0.3, 2.0).size == 0
+    state.gamma[space.conn[half]] = 0.2
+    assert half in delete_failed(space, state, 0.3, 2.0)
+    assert state.deletions[0] == (3e-6, whole) and state.deletions[1][0] == 4e-6
+    assert state.ledger.paper == pytest.approx(2.0 * space.V[state.deleted].sum(), rel=1e-14)
 
 
 def test_unknown_sinks_and_runaway_energies_are_refused(space: Space):

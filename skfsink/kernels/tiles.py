@@ -83,6 +83,15 @@ class Tiles:
         return float(least)
 
 
+    def mean_force(self) -> float:
+        """Mean magnitude of the forces the elements exert on their nodes, by component, at the last evaluation.
+
+        Unlike the sums at the nodes it does not vanish in equilibrium, so it says what a small residual is.
+        """
+        _, rows, _ = self._force.shape
+        return float(np.abs(self._force).sum()) / (rows * self.space.n_elements)
+
+
 @njit(cache=True)
 def _sum_at_nodes(local, start, offset, lanes, out):  # type: ignore[no-untyped-def]
     n, dim = out.shape
