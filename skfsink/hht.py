@@ -8,9 +8,10 @@ The two fields are coupled either by iterating them together in each step as in 
 pass: gamma from the last accepted state, then Newton's method at that gamma. The paper's HHT weights on gamma
 (Eq. 25) multiply an equation that has no rate term; they change its iteration, not its solution, and are left out.
 
-Where elements fail a step is at most 0.1 l/c_s. A step is accepted when, over the nodes that still have mass, the largest residual is below `force_tolerance` times
-the mean force, the last correction below `correction_tolerance` times the increment, and gamma has settled. History
-and deletions are committed on accepted steps only.
+A step is accepted when, over the nodes that still have mass, the largest residual is below `force_tolerance` times
+the mean force of the elements on their nodes plus the mean inertia, the last correction below `correction_tolerance`
+times the increment, and gamma has settled. Where elements fail a step is at most 0.1 l/c_s. History and deletions are
+committed on accepted steps only.
 """
 
 from __future__ import annotations
