@@ -340,11 +340,12 @@ class HHT:
             momentum.set_gamma(state.gamma, state.deleted)
             ledger.deletion += float(np.einsum("eq,eq,eq->", w, before - momentum.gamma, trial.W))
         self._mass, self._places = self._mass_matrix(), self._masses()
+        moving = self._kinetic(trial.mass, state.v)
         dead = self.space.lump(momentum.gamma) <= 0.0
         state.v[dead] = 0.0
         state.a[dead] = 0.0
         kinetic = self._kinetic(self._mass, state.v)
-        ledger.deletion += self._kinetic(trial.mass, state.v) - kinetic
+        ledger.deletion += moving - kinetic  # with what the mass floor of dead nodes still had
         ledger.kinetic = kinetic
         self.reaction = momentum.force(state.u)
         ledger.elastic = momentum.energy

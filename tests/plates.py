@@ -46,12 +46,14 @@ def plate(n: int = 13, side: float = 4.0, notch: float = 1.0) -> meshio.Mesh:
 
 def invoke(*arguments: object) -> tuple[Any, str, str]:
     """Exit status, stderr and stdout of the command line; an exception it lets through is the caller's."""
-    out, err = io.StringIO(), io.StringIO()
+    out, err, handler = io.StringIO(), io.StringIO(), signal.getsignal(signal.SIGTERM)
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         try:
             command(single_edge_notch, [str(a) for a in arguments])
         except SystemExit as end:
             return end.code, err.getvalue(), out.getvalue()
+        finally:
+            signal.signal(signal.SIGTERM, handler)
 
 
 def forked(arguments: Sequence[object], stop: int = 0, number: signal.Signals = signal.SIGKILL) -> tuple[int, str]:

@@ -104,19 +104,24 @@ def test_explicit_ledger_closes_through_a_fracture(fracture: Fracture, gamma_eve
 
 
 @pytest.mark.parametrize("coupling", ["single", "iterated"])
-def test_hht_ledger_closes_through_the_start_of_a_fracture(fracture: Fracture, coupling: str):
-    """Fails if an entry of the HHT ledger does not follow from the scheme: converged steps close to 1e-8."""
+def test_hht_ledger_closes_through_a_fracture(fracture: Fracture, coupling: str):
+    """Fails if an entry of the HHT ledger does not follow from the scheme: converged steps close to 1e-8.
+
+    Also when elements and nodes die, with what the mass floor of dead nodes held.
+    """
     fresh, momentum, density, free, velocity = fracture
     state = fresh()
-    hht = HHT(momentum, density, free, velocity, HHTControls(coupling=coupling, force_tolerance=1e-8,
-                                                            correction_tolerance=1e-8, gamma_tolerance=1e-7))
+    controls = HHTControls(dt=4e-7, coupling=coupling, force_tolerance=1e-8, correction_tolerance=1e-8,
+                           gamma_tolerance=1e-7)
+    hht = HHT(momentum, density, free, velocity, controls)
     hht.begin(state)
-    for _ in hht.run(state, 6e-6):
+    for _ in hht.run(state, 2.5e-5):
         assert abs(state.ledger.balance) <= 1e-8 * state.ledger.initial
-    elastic, kinetic = recomputed(momentum, state, momentum.lumped_mass(0.0))
+    elastic, kinetic = recomputed(momentum, state, momentum.lumped_mass(controls.mass_floor))
     assert state.ledger.elastic == pytest.approx(elastic, rel=1e-9)
     assert state.ledger.kinetic == pytest.approx(kinetic, rel=1e-6)
-    assert state.ledger.sink > 1e-2 * state.ledger.initial and state.gamma.min() < 1e-3
+    assert state.ledger.sink > 0.3 * state.ledger.initial and state.deleted.sum() > 5
+    assert 0 < state.ledger.sink_kinetic < state.ledger.sink_stored
 
 
 def test_integrators_agree_on_a_fracture(fracture: Fracture):

@@ -123,29 +123,40 @@ def test_hht_gives_up_with_a_reason(fracture: Fracture):
     assert state.step == 0 and hht.rejected == 1
 
 
-def test_nodes_that_lost_their_mass_stay_near_the_body(fracture: Fracture):
-    """Fails if nodes without mass are thrown about by Newton's method: they stay within an element of the body."""
+@pytest.mark.parametrize("mass", ["lumped", pytest.param("consistent", marks=pytest.mark.xfail(
+    strict=True, reason="the consistent mass has no floor: nodes leap by millimetres, the ledger misses up to 0.2"))])
+def test_nodes_that_lost_their_mass_stay_near_the_body(fracture: Fracture, mass: str):
+    """Fails if nodes without mass are thrown about by Newton's method: they stay within an element of the body.
+
+    Their leaps, times the small forces left on them, are energy: the ledger would not close.
+    """
     fresh, momentum, density, free, velocity = fracture
     state = fresh()
-    hht = HHT(momentum, density, free, velocity, HHTControls(dt=2e-7))
+    hht = HHT(momentum, density, free, velocity, HHTControls(dt=2e-7, mass=mass))
     hht.begin(state)
     for _ in hht.run(state, 4e-5):
         assert np.abs(state.u).max() < 0.3
-    assert abs(state.ledger.balance) <= 1e-3 * state.ledger.initial
+    assert state.deleted.sum() > 10
+    assert abs(state.ledger.balance) <= 5e-5 * state.ledger.initial
+
+
+def slow_loading(speed: float) -> tuple[HHT, State, float]:
+    """A notched plate about to be loaded at `speed` with inertia, and the time that takes."""
+    space = notched(9)
+    momentum, density = Momentum(space, AAA()), DensitySolver(space, SinkLaw())
+    free, velocity = grips(space, speed)
+    duration = 0.02 / speed
+    return (HHT(momentum, density, free, velocity, HHTControls(dt=duration / 20, dt_first=1e-8)), State.intact(space),
+            duration)
 
 
 @pytest.mark.parametrize("speed", [1e-3, 1e-9])
 def test_hht_steps_grow_over_ten_decades(speed: float):
-    """Fails if slow loading cannot be followed with inertia: from 1e-8 s steps grow to a twentieth of the loading time.
+    """Fails if slow loading cannot be followed with inertia: from 1e-8 s steps grow to a twentieth of the duration.
 
     Below the onset the body is elastic: the work of the grips is stored, but for rounding and what HHT damps.
     """
-    space = notched(9)
-    momentum, density = Momentum(space, AAA()), DensitySolver(space, SinkLaw())
-    free, velocity = grips(space, speed)
-    state = State.intact(space)
-    duration = 0.02 / speed
-    hht = HHT(momentum, density, free, velocity, HHTControls(dt=duration / 20, dt_first=1e-8))
+    hht, state, duration = slow_loading(speed)
     hht.begin(state)
     for _ in hht.run(state, duration):
         assert state.step < 300 and hht.rejected < 50
@@ -153,3 +164,19 @@ def test_hht_steps_grow_over_ten_decades(speed: float):
     ledger = state.ledger
     assert ledger.elastic == pytest.approx(ledger.work, rel=1e-4) and ledger.elastic > 1e-3
     assert ledger.kinetic < 1e-6 * ledger.elastic
+
+
+def test_slow_loading_continues_to_the_same_bits():
+    """Fails if the checkpoint misses what the predictor of long steps remembers."""
+    (one, state, _), (two, _, _) = slow_loading(1e-3), slow_loading(1e-3)
+    one.begin(state)
+    while one.dt < 1e-2:
+        one.step(state)
+    resumed, memory, density_memory = copy.deepcopy((state, one.memory(), one.density.memory()))
+    two.density.restore(density_memory)
+    two.restore(resumed, memory)
+    for _ in range(6):
+        one.step(state)
+        two.step(resumed)
+    np.testing.assert_array_equal(state.u, resumed.u)
+    assert state.ledger == resumed.ledger and one.dt == two.dt
