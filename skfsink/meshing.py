@@ -96,6 +96,7 @@ def single_edge_notch_mesh(*, side: float = 4.0, notch: float = 1.0, notch_width
     require("notch_width", notch_width, "mm", low=0, high=side, low_open=True, high_open=True)
     require("notch", notch, "mm", low=notch_width / 2, high=side, low_open=True, high_open=True)
     require("half_height", half_height, "mm", low=0, low_open=True)
+    require("seed", seed, low=0)
     radius, middle = notch_width / 2, side / 2
     outline = [
         Edge("bottom", (side, 0)),
