@@ -63,7 +63,7 @@ def some_slow(fast: list[object], slow: list[object]) -> list[object]:
 
 
 @pytest.mark.parametrize("kind, seed", some_slow([("short", 0), ("quasistatic", 0), ("both", 0)],
-                                                 [(kind, seed) for seed in (1, 2) for kind in RUNS]))
+                                                 [(kind, 1) for kind in RUNS]))
 def test_killed_runs_end_the_same(kind: str, seed: int, mesh: Path, tmp_path: Path, plain: None) -> None:
     """Fails if anything a step depends on is not in the checkpoint, or a file is at any moment a part of itself.
 
@@ -134,19 +134,19 @@ def test_resuming_a_finished_run_draws_it_again(mesh: Path, tmp_path: Path, plai
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["explicit", "quasistatic", "both"])
+@pytest.mark.parametrize("kind", ["explicit", "both"])
 def test_processes_killed_by_the_clock(kind: str, mesh: Path, tmp_path: Path) -> None:
     """Fails as `test_killed_runs_end_the_same` does, but for real: kills at any moment, with pictures."""
     arguments = ["--mesh", mesh, "--checkpoint-every", "0.2", *SMALL, *RUNS[kind]]
     program = [sys.executable, "-m", "skfsink.cases.single_edge_notch"]
     assert invoke(*arguments, "--out", tmp_path / "whole")[0] == 0
     out, dice = tmp_path / "out", random.Random(kind)
-    for attempt in range(8):
+    for attempt in range(6):
         go_on = ["--resume", out, "--quiet"] if (out / "scene.toml").exists() else [*arguments, "--out", out,
                                                                                   "--overwrite"]
         process = subprocess.Popen([*program, *map(str, go_on)], stderr=subprocess.PIPE, text=True)
         try:
-            process.wait(timeout=None if attempt == 7 else dice.uniform(2.5, 9))
+            process.wait(timeout=None if attempt == 5 else dice.uniform(2.5, 9))
             assert (process.returncode, process.stderr.read() if process.stderr else "") == (0, "")
         except subprocess.TimeoutExpired:
             process.kill()
