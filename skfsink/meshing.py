@@ -1,19 +1,16 @@
 """Unstructured all-quadrilateral meshes of notched samples, made with gmsh.
 
 A sample is described by its *outline*, a closed chain of straight and circular `Edge` pieces that carry the
-names of the boundaries, and by a `SizeField`, fine inside boxes and graded outside of them. `mesh_outline`
-turns these into a `meshio.Mesh`; a sample shape is no more than a function like `single_edge_notch_mesh`.
+names of the boundaries, and by a `SizeField`, fine inside boxes and bands and graded outside of them.
+`mesh_outline` turns these into a `meshio.Mesh`. The samples' own outlines are in :mod:`.shapes`.
 
 The meshes are irregular on purpose, since long rows of aligned elements steer a crack. Frontal Delaunay
 triangles are recombined and subdivided into quadrilaterals; a slight ripple of the element size, drawn from
 `seed`, breaks up the rows that grow where the size is uniform.
-
-Those in `cases/<sample>/meshes` are from `python -m skfsink.meshing <sample> [--mesh M3]` and gmsh 4.15.2.
 """
 
 from __future__ import annotations
 
-import argparse
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -25,11 +22,12 @@ import meshio
 import numpy as np
 from numpy.typing import NDArray
 
-from skfsink.errors import MeshError, MissingExtra, require
+from .errors import MeshError, MissingExtra, require
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 Box = tuple[float, float, float, float]  # x0, x1, y0, y1 of a rectangle of fine elements
+Band = tuple[float, float, float, float, float]  # x0, y0, x1, y1 of a line, and the distance from it
 
 BOUNDARY_PREFIX = "boundary:"
 RIPPLE = 0.08  # root mean square of the relative ripple of the element size
@@ -63,11 +61,12 @@ class Edge(NamedTuple):
 
 @dataclass(frozen=True)
 class SizeField:
-    """Element size: `h` inside the boxes, growing by `grading` per unit of distance up to `h_coarse`."""
+    """Element size: `h` inside boxes and bands, growing by `grading` per unit of distance up to `h_coarse`."""
 
     h: float
     h_coarse: float
-    boxes: tuple[Box, ...]
+    boxes: tuple[Box, ...] = ()
+    bands: tuple[Band, ...] = ()
     grading: float = 0.15
 
     def __post_init__(self) -> None:
@@ -77,50 +76,19 @@ class SizeField:
 
     def __call__(self, x: float, y: float) -> float:
         """The element size at a point."""
-        away = min(math.hypot(max(a - x, x - b, 0), max(c - y, y - d, 0)) for a, b, c, d in self.boxes)
-        return min(self.h_coarse, self.h + self.grading * away)
+        away = [math.hypot(max(a - x, x - b, 0), max(c - y, y - d, 0)) for a, b, c, d in self.boxes]
+        for a, b, c, d, width in self.bands:
+            along = ((x - a) * (c - a) + (y - b) * (d - b)) / ((c - a) ** 2 + (d - b) ** 2)
+            along = min(1.0, max(0.0, along))
+            away.append(max(0.0, math.hypot(x - a - along * (c - a), y - b - along * (d - b)) - width))
+        return min(self.h_coarse, self.h + self.grading * min(away, default=0.0))
 
 
-def single_edge_notch_mesh(*, side: float = 4.0, notch: float = 1.0, notch_width: float = 0.1,
-                           h: float = 0.1 / 3, h_coarse: float = 0.11, half_height: float = 1.7,
-                           seed: int = 0) -> meshio.Mesh:
-    """Mesh the square plate [0, side]^2 with a round-tipped notch from the left edge at mid-height.
+def mesh_outline(outline: Sequence[Edge], size: SizeField, *, holes: Sequence[Sequence[Edge]] = (),
+                 seed: int = 0) -> meshio.Mesh:
+    """Mesh the region inside a closed `outline` and outside of its `holes` with quadrilaterals.
 
-    `notch` is the length of the notch up to its tip, the top of a semicircle of diameter `notch_width`. The
-    element size is `h` in the corridor ahead of the notch, up to `half_height` above and below it and out to
-    the right edge, and is graded to `h_coarse` elsewhere. Lengths are in mm. Each `seed` gives another mesh
-    of the same sizes. The boundaries are `left` (without the mouth of the notch), `right`, `top`, `bottom`
-    and `notch` (both flanks and the tip).
-    """
-    require("side", side, "mm", low=0, low_open=True)
-    require("notch_width", notch_width, "mm", low=0, high=side, low_open=True, high_open=True)
-    require("notch", notch, "mm", low=notch_width / 2, high=side, low_open=True, high_open=True)
-    require("half_height", half_height, "mm", low=0, low_open=True)
-    require("seed", seed, low=0)
-    radius, middle = notch_width / 2, side / 2
-    outline = [
-        Edge("bottom", (side, 0)),
-        Edge("right", (side, side)),
-        Edge("top", (0, side)),
-        Edge("left", (0, middle + radius)),
-        Edge("notch", (notch - radius, middle + radius)),
-        Edge("notch", (notch - radius, middle - radius), via=(notch, middle)),
-        Edge("notch", (0, middle - radius)),
-        Edge("left", (0, 0)),
-    ]
-    corridor = (notch - 1.5 * notch_width, side, middle - half_height, middle + half_height)
-    return mesh_outline(outline, SizeField(h, h_coarse, (corridor,)), seed=seed)
-
-
-# Sizes are l/1.5, l/3, l/4 and l/5 for the length l = 0.1 mm, the last three moved by at most 1 % so that the
-# numbers of elements are within 1 % of those of Table 1 of the paper (11,140, 18,967 and 28,784).
-MESHES: dict[str, dict[str, Any]] = {
-    "coarse": {"h": 0.1 / 1.5}, "M3": {"h": 0.0331}, "M4": {"h": 0.02505}, "M5": {"h": 0.0202}}
-SAMPLES = {"single_edge_notch": (single_edge_notch_mesh, MESHES)}
-
-
-def mesh_outline(outline: Sequence[Edge], size: SizeField, *, seed: int = 0) -> meshio.Mesh:
-    """Mesh the region inside a closed `outline` with quadrilaterals; the boundary names become cell sets.
+    The boundary names become cell sets.
 
     What gmsh makes of a size field is some per cent off, by an amount that depends on the seed, and may have
     a tiny element, which would spoil the time step. Meshes are therefore made, each with its own ripple and a
@@ -128,7 +96,7 @@ def mesh_outline(outline: Sequence[Edge], size: SizeField, *, seed: int = 0) -> 
     """
     scale, best, least = TYPICAL_SCALE, None, math.inf
     with _gmsh_model() as gmsh:
-        names = _add_outline(gmsh, outline)
+        names = _add_outline(gmsh, outline, *holes)
         for attempt in range(ATTEMPTS):
             ripple = _ripple(RIPPLE_LENGTH * size.h, seed, attempt)
             points, quads, lines, triangles = _generate(gmsh, size, ripple, scale)
@@ -170,6 +138,31 @@ def read_mesh(path: str | Path) -> meshio.Mesh:
     return mesh
 
 
+def mirrored(mesh: meshio.Mesh, axis: int, at: float) -> meshio.Mesh:
+    """The mesh with its mirror image in the line where coordinate `axis` is `at`; its cell set "mirror" goes.
+
+    The nodes on the line are shared, and coordinates on both sides are mirror images to the last bit if `at` is a
+    sum of few powers of two.
+    """
+    points = mesh.points.copy()
+    shared = np.abs(points[:, axis] - at) < 1e-9
+    points[shared, axis] = at
+    image = np.where(shared, np.arange(len(points)), len(points) - 1 + np.cumsum(~shared))
+    copy = points[~shared].copy()
+    copy[:, axis] = 2 * at - copy[:, axis]
+    quads, lines = mesh.cells_dict["quad"], mesh.cells_dict["line"]
+    keep = np.setdiff1d(np.arange(len(lines)), mesh.cell_sets["mirror"][1])
+    number = np.full(len(lines), -1)
+    number[keep] = np.arange(len(keep))
+    sets = {}
+    for name, (none, members) in mesh.cell_sets.items():
+        if name != "mirror":
+            sets[name] = [none, np.concatenate([number[members], number[members] + len(keep)])]
+    cells = [("quad", np.concatenate([quads, image[quads[:, ::-1]]])),
+             ("line", np.concatenate([lines[keep], image[lines[keep]]]))]
+    return meshio.Mesh(np.concatenate([points, copy]), cells, cell_sets=sets)
+
+
 def _ripple(length: float, *seeds: int, waves: int = 8) -> Callable[[float, float], float]:
     """A random smooth factor around 1: a sum of plane waves of all directions and about the given length."""
     random = np.random.default_rng([int(require("seed", seed, low=0)) for seed in seeds])
@@ -199,20 +192,25 @@ def _gmsh_model() -> Iterator[Any]:
         gmsh.finalize()
 
 
-def _add_outline(gmsh: Any, outline: Sequence[Edge]) -> dict[int, str]:
-    """Add the surface inside the outline to the model; returns the boundary names by curve tag."""
+def _add_outline(gmsh: Any, *outlines: Sequence[Edge]) -> dict[int, str]:
+    """Add the surface inside the first outline without the others to the model; boundary names by curve tag."""
     occ = gmsh.model.occ
-    corners = [occ.addPoint(*edge.end, 0) for edge in outline]
     names: dict[int, str] = {}
-    for i, edge in enumerate(outline):
-        if edge.via is None:
-            tag = occ.addLine(corners[i - 1], corners[i])
-        else:
-            via = occ.addPoint(*edge.via, 0)
-            tag = occ.addCircleArc(corners[i - 1], via, corners[i], center=False)
-            occ.remove([(0, via)])
-        names[tag] = edge.name
-    occ.addPlaneSurface([occ.addCurveLoop(list(names))])
+    loops = []
+    for outline in outlines:
+        corners = [occ.addPoint(*edge.end, 0) for edge in outline]
+        tags = []
+        for i, edge in enumerate(outline):
+            if edge.via is None:
+                tag = occ.addLine(corners[i - 1], corners[i])
+            else:
+                via = occ.addPoint(*edge.via, 0)
+                tag = occ.addCircleArc(corners[i - 1], via, corners[i], center=False)
+                occ.remove([(0, via)])
+            tags.append(tag)
+            names[tag] = edge.name
+        loops.append(occ.addCurveLoop(tags))
+    occ.addPlaneSurface(loops)
     occ.synchronize()
     return names
 
@@ -275,27 +273,3 @@ def _to_meshio(points: Array, quads: Indices, lines: Mapping[int, Indices],
     owner = np.repeat(np.array([names[tag] for tag in lines]), [len(block) for block in blocks])
     sets = {name: [np.zeros(0, int), np.flatnonzero(owner == name)] for name in dict.fromkeys(names.values())}
     return meshio.Mesh(points, [("quad", index[quads]), ("line", np.concatenate(blocks))], cell_sets=sets)
-
-
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Make the meshes of a sample and write them below `cases`."""
-    parser = argparse.ArgumentParser(prog="python -m skfsink.meshing", description=main.__doc__)
-    parser.add_argument("sample", choices=SAMPLES)
-    parser.add_argument("--mesh", default="all", help="name of a mesh, or all of them (default)")
-    parser.add_argument("--output", type=Path, help="folder (default: cases/<sample>/meshes of the checkout)")
-    options = parser.parse_args(arguments)
-    make, settings = SAMPLES[options.sample]
-    if options.mesh != "all" and options.mesh not in settings:
-        parser.error(f"--mesh must be one of {', '.join(settings)} or all")
-    folder = options.output or Path(__file__).resolve().parents[1] / "cases" / options.sample / "meshes"
-    folder.mkdir(parents=True, exist_ok=True)
-    for name in settings if options.mesh == "all" else [options.mesh]:
-        mesh = make(**settings[name])
-        write_mesh(folder / f"{name}.vtu", mesh)
-        quality = scaled_jacobian(mesh.points, mesh.cells_dict["quad"])
-        print(f"{name}: {len(quality)} elements, {len(mesh.points)} nodes, "
-              f"scaled Jacobian >= {quality.min():.3f}, 1 % quantile {np.quantile(quality, 0.01):.3f}")
-
-
-if __name__ == "__main__":
-    main()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import inspect
 import io
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -14,11 +15,12 @@ import numpy as np
 import skfem
 from skfem.io.meshio import HEX_MAPPING
 
-from .errors import MeshError, SkfsinkError
+from .errors import MeshError, ParameterError, SkfsinkError, require
 from .meshing import read_mesh
+from .shapes import SHAPES
 from .space import Space
 
-__all__ = ["Sample", "data_folder", "load_sample"]
+__all__ = ["Sample", "data_folder", "load_sample", "shape_sample"]
 
 _CELLS = {"quad": (skfem.MeshQuad, "line"), "hexahedron": (skfem.MeshHex, "quad")}
 
@@ -71,10 +73,12 @@ def data_folder(case: str) -> Path:
     raise MeshError(f"the data of case {case} are not installed")
 
 
-def load_sample(case: str, mesh: str, make: Callable[[], meshio.Mesh] | None = None) -> Sample:
+def load_sample(case: str, mesh: str, make: Callable[[], meshio.Mesh] | None = None,
+                lift: Callable[[meshio.Mesh], meshio.Mesh] | None = None) -> Sample:
     """The sample of `case` on the mesh of that name, or in the mesh file of that path.
 
     `make` builds the mesh when the committed ones do not apply, because a dimension was changed; it needs gmsh.
+    `lift` turns a named mesh, which is a section, into the body; a mesh file is taken as it is.
 
     Raises
     ------
@@ -83,8 +87,9 @@ def load_sample(case: str, mesh: str, make: Callable[[], meshio.Mesh] | None = N
     MissingExtra
         `make` was given and gmsh is not installed.
     """
+    lift = lift or _as_it_is
     if make is not None:
-        return _from_meshio(mesh, _read(make, f"the mesh {mesh} cannot be made"))
+        return _from_meshio(mesh, lift(_read(make, f"the mesh {mesh} cannot be made")))
     folder = data_folder(case) / "meshes"
     known = sorted(p.stem for p in folder.glob("*.vtu"))
     path = folder / f"{mesh}.vtu"
@@ -94,7 +99,40 @@ def load_sample(case: str, mesh: str, make: Callable[[], meshio.Mesh] | None = N
             raise MeshError(f"mesh must be one of {', '.join(known)}, or the path of a mesh file; got {mesh!r}")
         if not path.is_file():
             raise MeshError(f"there is no mesh file {mesh}")
-    return _from_meshio(mesh, _read(lambda: read_mesh(path), f"the mesh file {path} cannot be read"))
+        lift = _as_it_is
+    return _from_meshio(mesh, lift(_read(lambda: read_mesh(path), f"the mesh file {path} cannot be read")))
+
+
+def shape_sample(case: str, own: Mapping[str, Any], lift: Callable[[meshio.Mesh], meshio.Mesh] | None = None) -> Sample:
+    """The sample of a case whose shape is one of :data:`.shapes.SHAPES`.
+
+    `own` are the arguments of the case function: `mesh`, `mesh_seed`, and the dimensions, named as in the function
+    of the shape. The committed mesh is read where they are those of the shape; gmsh makes another one else.
+
+    Raises
+    ------
+    ParameterError
+        A dimension or a seed was given together with a mesh file.
+    MeshError, MissingExtra
+        As of :func:`load_sample`.
+    """
+    shape, name = SHAPES[case], str(own["mesh"])
+    seed = int(require("mesh-seed", own["mesh_seed"], low=0, whole=True))
+    defaults = {k: p.default for k, p in inspect.signature(shape.make).parameters.items() if k in own}
+    changed = {k: own[k] for k, default in defaults.items() if own[k] != default}
+    if not (seed or changed):
+        return load_sample(case, name, lift=lift)
+    if Path(name).suffix:
+        words = [*(k.replace("_", "-") for k in defaults), "mesh-seed"]
+        raise ParameterError(f"{', '.join(words[:-1])} and {words[-1]} are for the meshes {', '.join(shape.meshes)}; "
+                             f"the mesh file {name} is as it is")
+    if name not in shape.meshes:
+        return load_sample(case, name)  # which says what there is
+    return load_sample(case, name, lambda: shape.make(**{**shape.meshes[name], **changed}, seed=seed), lift)
+
+
+def _as_it_is(mesh: meshio.Mesh) -> meshio.Mesh:
+    return mesh
 
 
 def _read(source: Callable[[], meshio.Mesh], failure: str) -> meshio.Mesh:

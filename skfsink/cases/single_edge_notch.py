@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated, Any
 
-from ..errors import ParameterError, require
-from ..meshing import MESHES, single_edge_notch_mesh
 from ..options import SAMPLE, Options
 from ..result import Result
 from ..run import run_case
-from ..sample import load_sample
+from ..sample import shape_sample
 from ..scene import Grip, Scene
+from ..shapes import check_plate
 
 __all__ = ["single_edge_notch"]
 
@@ -56,25 +54,13 @@ def single_edge_notch(*, side: Annotated[float, SAMPLE] = 4.0, notch: Annotated[
 
 
 def _scene(own: dict[str, Any], options: Options) -> Scene:
-    name = str(own["mesh"])
-    side = require("side", own["side"], "mm", low=0, low_open=True)
-    width = require("notch-width", own["notch_width"], "mm", low=0, high=side, low_open=True, high_open=True)
-    notch = require("notch", own["notch"], "mm", low=width / 2, high=side, low_open=True, high_open=True)
-    seed = int(require("mesh-seed", own["mesh_seed"], low=0, whole=True))
-    make = None
-    if seed or (side, notch, width) != (4.0, 1.0, 0.1):
-        if Path(name).suffix:
-            raise ParameterError(f"side, notch, notch-width and mesh-seed are for the meshes {', '.join(MESHES)}; "
-                                 f"the mesh file {name} is as it is")
-
-        def make() -> Any:
-            return single_edge_notch_mesh(side=side, notch=notch, notch_width=width, **MESHES[name], seed=seed)
+    check_plate(own["side"], own["notch"], own["notch_width"])
     speed = options.speed
     return Scene(
         case="single_edge_notch", title="Single-edge notched plate", parameters={**own, **options.parameters()},
-        sample=load_sample("single_edge_notch", name, make if name in MESHES else None), material=options.material(),
-        sink_law=options.sink_law(), grips=(Grip("top", (0.0, speed)), Grip("bottom", (0.0, -speed))),
-        notch=("notch",), controls=options.controls(), assumed=ASSUMED)
+        sample=shape_sample("single_edge_notch", own), material=options.material(), sink_law=options.sink_law(),
+        grips=(Grip("top", (0.0, speed)), Grip("bottom", (0.0, -speed))), notch=("notch",),
+        controls=options.controls(), assumed=ASSUMED)
 
 
 if __name__ == "__main__":

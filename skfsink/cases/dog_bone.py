@@ -1,0 +1,84 @@
+"""Dog-bone in tension, in three dimensions (Sec. 5.5): cracks from the ends of the gauge, straight, too short to branch."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from ..errors import require
+from ..options import SAMPLE, Options
+from ..result import Result
+from ..run import run_case
+from ..sample import shape_sample
+from ..scene import Grip, Scene
+from ..shapes import check_dog_bone
+from ..sweeping import swept
+
+__all__ = ["dog_bone"]
+
+ASSUMED = (
+    "length 10 mm: the paper prints the thickness only",
+    "gauge 4 mm long and 1.5 mm wide, ends 3 mm wide, fillets of 0.75 mm tangent to the gauge: not printed",
+    "element size l/5 in gauge and fillets, l/3.8 in the ends, two layers: chosen to meet 82,382 elements",
+)
+
+
+def dog_bone(*, length: Annotated[float, SAMPLE] = 10.0, gauge_length: Annotated[float, SAMPLE] = 4.0,
+             gauge_width: Annotated[float, SAMPLE] = 1.5, grip_width: Annotated[float, SAMPLE] = 3.0,
+             fillet: Annotated[float, SAMPLE] = 0.75, thickness: Annotated[float, SAMPLE] = 0.2,
+             layers: Annotated[int, SAMPLE] = 2, mesh: Annotated[str, SAMPLE] = "coarse",
+             mesh_seed: Annotated[int, SAMPLE] = 0, options: Options = Options()) -> Result:  # noqa: B008
+    """Pull a dog-bone apart, slowly, and watch the cracks.
+
+    The ends move apart at `speed` each along y and hold the sample in x and z. It is loaded statically to the onset of
+    failure; the cracks then run dynamically or quasi-statically.
+
+    Parameters
+    ----------
+    length
+        Length along y [mm], > gauge-length + 2 fillet.
+    gauge_length
+        Length of the part of constant width [mm], > 0.
+    gauge_width
+        Its width along x [mm], > 0.
+    grip_width
+        Width of the ends [mm], >= gauge-width + 2 fillet.
+    fillet
+        Radius of the quarter circles between the gauge and the ends, tangent to the gauge [mm], > 0.
+    thickness
+        Thickness along z [mm], > 0.
+    layers
+        Elements over the thickness, >= 1.
+    mesh
+        "coarse", "paper" (element size l/1.5, l/5 in the gauge), or the path of a mesh file of hexahedra.
+    mesh_seed
+        Another mesh of the same sizes for each number; other than 0 it needs gmsh (the mesh extra).
+    options
+        Material, analysis and controls; see :class:`~skfsink.options.Options`.
+
+    Returns
+    -------
+    Result
+        Summary, history and last state; its files are in the output folder.
+    """
+    own = {"length": length, "gauge_length": gauge_length, "gauge_width": gauge_width, "grip_width": grip_width,
+           "fillet": fillet, "thickness": thickness, "layers": layers, "mesh": mesh, "mesh_seed": mesh_seed}
+    return run_case(dog_bone, _scene, own, options)
+
+
+def _scene(own: dict[str, Any], options: Options) -> Scene:
+    check_dog_bone(own["length"], own["gauge_length"], own["gauge_width"], own["grip_width"], own["fillet"])
+    require("thickness", own["thickness"], "mm", low=0, low_open=True)
+    require("layers", own["layers"], low=1, high=100, whole=True)
+    speed = options.speed
+    return Scene(
+        case="dog_bone", title="Dog-bone", parameters={**own, **options.parameters()},
+        sample=shape_sample("dog_bone", own, lambda section: swept(section, own["thickness"], own["layers"])),
+        material=options.material(), sink_law=options.sink_law(),
+        grips=(Grip("top", (0.0, speed, 0.0)), Grip("bottom", (0.0, -speed, 0.0))), controls=options.controls(),
+        assumed=ASSUMED)
+
+
+if __name__ == "__main__":
+    from ..cli import command
+
+    command(dog_bone)

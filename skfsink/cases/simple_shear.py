@@ -1,0 +1,69 @@
+"""Simple shear of a notched plate (Sec. 5.2): mode II, one crack that runs into the tensile half."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from ..options import SAMPLE, Options
+from ..result import Result
+from ..run import run_case
+from ..sample import shape_sample
+from ..scene import Grip, Scene
+from ..shapes import check_plate
+
+__all__ = ["simple_shear"]
+
+ASSUMED = (
+    "side 4 mm: the paper prints no length of the plate; its 50,847 elements are then of size l/5.7 throughout",
+    "notch 2 mm long, to the middle, at mid-height: not printed",
+    "notch 0.1 mm = l wide with a round tip: not printed",
+    "the top edge stays at its height: the paper prescribes its motion in x and does not mention y",
+)
+
+
+def simple_shear(*, side: Annotated[float, SAMPLE] = 4.0, notch: Annotated[float, SAMPLE] = 2.0,
+                 notch_width: Annotated[float, SAMPLE] = 0.1, mesh: Annotated[str, SAMPLE] = "M4",
+                 mesh_seed: Annotated[int, SAMPLE] = 0, options: Options = Options()) -> Result:  # noqa: B008
+    """Shear a square plate with a notch to its middle, slowly, and watch the crack.
+
+    The bottom edge is fixed; the top edge moves to the right at `speed` and keeps its height. The plate is loaded
+    statically to the onset of failure; the crack then runs dynamically or quasi-statically.
+
+    Parameters
+    ----------
+    side
+        Side of the plate [mm], > notch.
+    notch
+        Length of the notch up to its round tip, at mid-height [mm], in (notch-width/2, side).
+    notch_width
+        Width of the notch [mm], in (0, side).
+    mesh
+        "coarse" (element size l/4 where the crack runs), "M4" (l/4, wider), "paper" (l/5.7 throughout), or the path
+        of a mesh file.
+    mesh_seed
+        Another mesh of the same sizes for each number; other than 0 it needs gmsh (the mesh extra).
+    options
+        Material, analysis and controls; see :class:`~skfsink.options.Options`.
+
+    Returns
+    -------
+    Result
+        Summary, history and last state; its files are in the output folder.
+    """
+    own = {"side": side, "notch": notch, "notch_width": notch_width, "mesh": mesh, "mesh_seed": mesh_seed}
+    return run_case(simple_shear, _scene, own, options)
+
+
+def _scene(own: dict[str, Any], options: Options) -> Scene:
+    check_plate(own["side"], own["notch"], own["notch_width"])
+    return Scene(
+        case="simple_shear", title="Simple shear", parameters={**own, **options.parameters()},
+        sample=shape_sample("simple_shear", own), material=options.material(), sink_law=options.sink_law(),
+        grips=(Grip("top", (options.speed, 0.0)), Grip("bottom", (0.0, 0.0))), notch=("notch",),
+        controls=options.controls(), assumed=ASSUMED)
+
+
+if __name__ == "__main__":
+    from ..cli import command
+
+    command(simple_shear)

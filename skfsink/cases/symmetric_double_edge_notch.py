@@ -1,0 +1,76 @@
+"""Symmetric double-edge notched plate in tension (Sec. 5.3): two cracks that branch near each other, and merge."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from ..errors import require
+from ..options import SAMPLE, Options
+from ..result import Result
+from ..run import run_case
+from ..sample import shape_sample
+from ..scene import Grip, Scene
+from ..shapes import check_plate
+
+__all__ = ["symmetric_double_edge_notch"]
+
+ASSUMED = (
+    "side 2.5 mm: the paper prints no length; the dissipated energies fit a ligament of 1 to 1.8 mm",
+    "notches 0.625 mm long at mid-height: not printed",
+    "notches 0.1 mm = l wide with round tips: not printed",
+    "the grips hold the plate sideways: not printed",
+    "element size l/5 on the mesh `paper`: not printed",
+)
+
+
+def symmetric_double_edge_notch(*, side: Annotated[float, SAMPLE] = 2.5, notch: Annotated[float, SAMPLE] = 0.625,
+                                notch_width: Annotated[float, SAMPLE] = 0.1, mesh: Annotated[str, SAMPLE] = "M4",
+                                mesh_seed: Annotated[int, SAMPLE] = 0,
+                                options: Options = Options()) -> Result:  # noqa: B008
+    """Pull a square plate with equal notches from both sides apart, slowly, and watch the cracks.
+
+    The grips at the top and bottom edge move apart at `speed` each and hold the plate sideways. The plate is loaded
+    statically to the onset of failure; the cracks then run dynamically or quasi-statically.
+
+    Parameters
+    ----------
+    side
+        Side of the plate [mm], > 2 notch.
+    notch
+        Length of each notch up to its round tip, at mid-height [mm], in (notch-width/2, side/2).
+    notch_width
+        Width of the notches [mm], in (0, side).
+    mesh
+        "coarse" (element size l/1.5), "mirror" (l/1.5, mirror-symmetric), "M4" (l/4), "paper" (l/5), or the path of a
+        mesh file.
+    mesh_seed
+        Another mesh of the same sizes for each number; other than 0 it needs gmsh (the mesh extra).
+    options
+        Material, analysis and controls; see :class:`~skfsink.options.Options`.
+
+    Returns
+    -------
+    Result
+        Summary, history and last state; its files are in the output folder.
+    """
+    own = {"side": side, "notch": notch, "notch_width": notch_width, "mesh": mesh, "mesh_seed": mesh_seed}
+    return run_case(symmetric_double_edge_notch, _scene, own, options)
+
+
+def _scene(own: dict[str, Any], options: Options) -> Scene:
+    check_plate(own["side"], own["notch"], own["notch_width"])
+    require("notch", own["notch"], "mm", low=own["notch_width"] / 2, high=own["side"] / 2, low_open=True,
+            high_open=True)
+    speed = options.speed
+    return Scene(
+        case="symmetric_double_edge_notch", title="Symmetric double-edge notched plate",
+        parameters={**own, **options.parameters()}, sample=shape_sample("symmetric_double_edge_notch", own),
+        material=options.material(), sink_law=options.sink_law(),
+        grips=(Grip("top", (0.0, speed)), Grip("bottom", (0.0, -speed))), notch=("notch",),
+        controls=options.controls(), assumed=ASSUMED)
+
+
+if __name__ == "__main__":
+    from ..cli import command
+
+    command(symmetric_double_edge_notch)

@@ -1,0 +1,244 @@
+"""The samples' shapes: outlines, where their elements are fine, and the sizes of the committed meshes.
+
+Each sample has a function that returns its mesh; its keyword arguments are the sample's dimensions [mm], the element
+sizes and the `seed`. Three-dimensional samples are meshed as a section, which :mod:`.sweeping` turns into hexahedra.
+The meshes in `cases/<sample>/meshes` are from `python -m skfsink.shapes <sample> [--mesh M3]` and gmsh 4.15.2.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import meshio
+import numpy as np
+
+from .errors import require
+from .meshing import Band, Box, Edge, SizeField, mesh_outline, mirrored, scaled_jacobian, write_mesh
+
+__all__ = ["SHAPES", "Shape", "check_dog_bone", "check_plate", "check_shell"]
+
+Point = tuple[float, float]
+
+
+def single_edge_notch_mesh(*, side: float = 4.0, notch: float = 1.0, notch_width: float = 0.1,
+                           h: float = 0.1 / 3, h_coarse: float = 0.11, half_height: float = 1.7,
+                           seed: int = 0) -> meshio.Mesh:
+    """Mesh the square plate [0, side]^2 with a round-tipped notch from the left edge at mid-height.
+
+    `notch` is the length of the notch up to its tip, the top of a semicircle of diameter `notch_width`. The
+    element size is `h` in the corridor ahead of the notch, up to `half_height` above and below it and out to
+    the right edge, and is graded to `h_coarse` elsewhere. Lengths are in mm. Each `seed` gives another mesh
+    of the same sizes. The boundaries are `left` (without the mouth of the notch), `right`, `top`, `bottom`
+    and `notch` (both flanks and the tip).
+    """
+    check_plate(side, notch, notch_width)
+    require("half-height", half_height, "mm", low=0, low_open=True)
+    middle = side / 2
+    corridor = (notch - 1.5 * notch_width, side, middle - half_height, middle + half_height)
+    return _edge_notched(side, notch, notch_width, SizeField(h, h_coarse, (corridor,)), seed)
+
+
+def simple_shear_mesh(*, side: float = 4.0, notch: float = 2.0, notch_width: float = 0.1, h: float = 0.025,
+                      h_coarse: float = 0.11, half_width: float = 0.5, seed: int = 0) -> meshio.Mesh:
+    """Mesh the square plate [0, side]^2 with a round-tipped notch from the left edge to the middle.
+
+    Sheared to the right at its top, the plate cracks from the tip down to the right. Elements are of size `h` around
+    the tip and in a band of `half_width` on each side of that path, graded to `h_coarse` elsewhere. Boundaries as
+    those of the single-edge notched plate.
+    """
+    check_plate(side, notch, notch_width)
+    require("half-width", half_width, "mm", low=0, low_open=True)
+    middle = side / 2
+    tip: Box = (notch - 0.2, notch + 0.35, middle - 0.35, middle + 0.25)
+    path: Band = (notch, middle, side, middle - 0.95 * (side - notch), half_width)
+    return _edge_notched(side, notch, notch_width, SizeField(h, h_coarse, (tip,), (path,)), seed)
+
+
+def symmetric_double_edge_notch_mesh(*, side: float = 2.5, notch: float = 0.625, notch_width: float = 0.1,
+                                     h: float = 0.025, h_coarse: float = 0.11, half_height: float = 0.7,
+                                     mirror: bool = False, seed: int = 0) -> meshio.Mesh:
+    """Mesh the square plate [0, side]^2 with equal notches from the left and the right edge at mid-height.
+
+    Fine within `half_height` of mid-height between the notches. With `mirror` the right half is the mirror image of
+    the left one. The boundaries are `left`, `right`, `top`, `bottom` and `notch` (of both).
+    """
+    check_plate(side, notch, notch_width)
+    require("notch", notch, "mm", low=0, high=side / 2, high_open=True)
+    require("half-height", half_height, "mm", low=0, low_open=True)
+    middle = side / 2
+    size = SizeField(h, h_coarse, ((notch - 0.15, side - notch + 0.15, middle - half_height, middle + half_height),))
+    if not mirror:
+        return mesh_outline(_double_edge_notched(side, notch, notch_width, middle, middle), size, seed=seed)
+    left = [Edge("bottom", (middle, 0)), Edge("mirror", (middle, side)), Edge("top", (0, side)),
+            *_notch_from_left(notch, notch_width, middle), Edge("left", (0, 0))]
+    return mirrored(mesh_outline(left, size, seed=seed), 0, middle)
+
+
+def asymmetric_double_edge_notch_mesh(*, side: float = 4.0, notch: float = 1.0, notch_width: float = 0.1,
+                                      offset: float = 0.6, h: float = 0.025, h_coarse: float = 0.11,
+                                      half_height: float = 1.35, seed: int = 0) -> meshio.Mesh:
+    """Mesh the square plate [0, side]^2 with a notch from each side, the right one higher by `offset`.
+
+    Both are `offset`/2 from mid-height. Fine within `half_height` of mid-height, where the notches and the cracks
+    are. The boundaries are `left`, `right`, `top`, `bottom` and `notch` (of both).
+    """
+    check_plate(side, notch, notch_width)
+    require("offset", offset, "mm", low=0, high=side - 2 * notch_width, high_open=True)
+    require("half-height", half_height, "mm", low=0, low_open=True)
+    low, high = (side - offset) / 2, (side + offset) / 2
+    corridor = (notch - 1.0, side - notch + 1.0, side / 2 - half_height, side / 2 + half_height)
+    return mesh_outline(_double_edge_notched(side, notch, notch_width, low, high),
+                        SizeField(h, h_coarse, (corridor,)), seed=seed)
+
+
+def dog_bone_mesh(*, length: float = 10.0, gauge_length: float = 4.0, gauge_width: float = 1.5, grip_width: float = 3.0,
+                  fillet: float = 0.75, h: float = 0.02, h_coarse: float = 0.11, seed: int = 0) -> meshio.Mesh:
+    """Mesh the section of a dog-bone: centre at the origin, pulled along y.
+
+    A gauge of `gauge_length` and `gauge_width` widens over quarter circles of radius `fillet`, tangent to it, to
+    shoulders and ends of `grip_width`. Fine in the gauge and the fillets. The boundaries are `top`, `bottom` and
+    `side`.
+    """
+    check_dog_bone(length, gauge_length, gauge_width, grip_width, fillet)
+    end, gauge, neck, wide = length / 2, gauge_length / 2, gauge_width / 2, grip_width / 2
+    shoulder, rim, arc = gauge + fillet, neck + fillet, fillet * (1 - math.sqrt(0.5))
+    quarter = [(neck, gauge), (neck + arc, shoulder - arc), (rim, shoulder)]  # from the gauge to the shoulder
+
+    def corner(sx: int, sy: int, outward: bool) -> list[Edge]:
+        """The pieces from the gauge to the end of the sample, or back."""
+        (a, via, b) = [(sx * x, sy * y) for x, y in quarter]
+        straight = [] if math.isclose(rim, wide) else [Edge("side", (sx * wide, sy * shoulder))]
+        if outward:
+            return [Edge("side", b, via=via), *straight, Edge("side", (sx * wide, sy * end))]
+        return [Edge("side", (sx * wide, sy * shoulder)), *([Edge("side", b)] if straight else []),
+                Edge("side", a, via=via)]
+
+    outline = [Edge("bottom", (wide, -end)), *corner(1, -1, False), Edge("side", (neck, gauge)), *corner(1, 1, True),
+               Edge("top", (-wide, end)), *corner(-1, 1, False), Edge("side", (-neck, -gauge)), *corner(-1, -1, True)]
+    return mesh_outline(outline, SizeField(h, h_coarse, ((-rim, rim, -shoulder, shoulder),)), seed=seed)
+
+
+def cylindrical_shell_mesh(*, inner_radius: float = 1.9, thickness: float = 0.1, length: float = 5.0,
+                           notch: float = 1.0, notch_width: float = 0.1, h: float = 0.025, h_coarse: float = 0.11,
+                           half_height: float = 1.2, seed: int = 0) -> meshio.Mesh:
+    """Mesh the unrolled mid-surface of a half cylinder, [0, pi r] x [0, length], with a slit in its middle.
+
+    r is the mean radius; x is the arc and y the axis of the cylinder. The slit is `notch` long from tip to tip, along
+    the arc, with round ends of diameter `notch_width`. Fine within `half_height` of mid-length. The boundaries are
+    `top`, `bottom`, `edge` (the straight free edges) and `notch`.
+    """
+    check_shell(inner_radius, thickness, length, notch, notch_width)
+    arc, middle = math.pi * (inner_radius + thickness / 2), length / 2
+    require("half-height", half_height, "mm", low=0, low_open=True)
+    outline = [Edge("bottom", (arc, 0)), Edge("edge", (arc, length)), Edge("top", (0, length)), Edge("edge", (0, 0))]
+    r, a = notch_width / 2, notch / 2 - notch_width / 2
+    c = arc / 2
+    slit = [Edge("notch", (c + a, middle - r)), Edge("notch", (c + a, middle + r), via=(c + a + r, middle)),
+            Edge("notch", (c - a, middle + r)), Edge("notch", (c - a, middle - r), via=(c - a - r, middle))]
+    corridor = (0.0, arc, middle - half_height, middle + half_height)
+    return mesh_outline(outline, SizeField(h, h_coarse, (corridor,)), holes=[slit], seed=seed)
+
+
+# --- outlines ---
+def check_plate(side: float, notch: float, notch_width: float) -> None:
+    """Refuse dimensions [mm] that are no plate with a notch from its edge (ParameterError)."""
+    require("side", side, "mm", low=0, low_open=True)
+    require("notch-width", notch_width, "mm", low=0, high=side, low_open=True, high_open=True)
+    require("notch", notch, "mm", low=notch_width / 2, high=side, low_open=True, high_open=True)
+
+
+def check_dog_bone(length: float, gauge_length: float, gauge_width: float, grip_width: float, fillet: float) -> None:
+    """Refuse dimensions [mm] that are no dog-bone (ParameterError)."""
+    for name, value in (("gauge-length", gauge_length), ("gauge-width", gauge_width), ("fillet", fillet)):
+        require(name, value, "mm", low=0, low_open=True)
+    require("length", length, "mm", low=gauge_length + 2 * fillet, low_open=True)
+    require("grip-width", grip_width, "mm", low=gauge_width + 2 * fillet)
+
+
+def check_shell(inner_radius: float, thickness: float, length: float, notch: float, notch_width: float) -> None:
+    """Refuse dimensions [mm] that are no half cylinder with a slit (ParameterError)."""
+    require("inner-radius", inner_radius, "mm", low=0, low_open=True)
+    require("thickness", thickness, "mm", low=0, high=2 * inner_radius, low_open=True, high_open=True)
+    require("length", length, "mm", low=0, low_open=True)
+    require("notch-width", notch_width, "mm", low=0, high=length, low_open=True, high_open=True)
+    arc = math.pi * (inner_radius + thickness / 2)
+    require("notch", notch, "mm", low=notch_width, high=arc, low_open=True, high_open=True)
+
+
+def _notch_from_left(notch: float, width: float, y: float) -> list[Edge]:
+    """From the left edge above the notch to the left edge below it."""
+    r = width / 2
+    return [Edge("left", (0, y + r)), Edge("notch", (notch - r, y + r)),
+            Edge("notch", (notch - r, y - r), via=(notch, y)), Edge("notch", (0, y - r))]
+
+
+def _edge_notched(side: float, notch: float, width: float, size: SizeField, seed: int) -> meshio.Mesh:
+    outline = [Edge("bottom", (side, 0)), Edge("right", (side, side)), Edge("top", (0, side)),
+               *_notch_from_left(notch, width, side / 2), Edge("left", (0, 0))]
+    return mesh_outline(outline, size, seed=seed)
+
+
+def _double_edge_notched(side: float, notch: float, width: float, left: float, right: float) -> list[Edge]:
+    """Square plate with notches from the left and the right edge at these heights."""
+    r, tip = width / 2, side - notch
+    return [Edge("bottom", (side, 0)), Edge("right", (side, right - r)), Edge("notch", (tip + r, right - r)),
+            Edge("notch", (tip + r, right + r), via=(tip, right)), Edge("notch", (side, right + r)),
+            Edge("right", (side, side)), Edge("top", (0, side)), *_notch_from_left(notch, width, left),
+            Edge("left", (0, 0))]
+
+
+# --- the committed meshes ---
+class Shape(NamedTuple):
+    """How a sample is meshed, and the settings of its named meshes."""
+
+    make: Callable[..., meshio.Mesh]
+    meshes: Mapping[str, Mapping[str, Any]]
+
+
+# Sizes are l/1.5, l/3, l/4 and l/5 for the length l = 0.1 mm, moved by at most 1 % (and the sizes away from the
+# cracks chosen) so that the numbers of elements are within 3 % of the paper's: 11,140, 18,967 and 28,784 in Table 1,
+# 50,847 in Sec. 5.2, 28,531 in Sec. 5.4, 82,382 hexahedra in Sec. 5.5 and 53,122 in Sec. 5.6, in two layers each.
+SHAPES: dict[str, Shape] = {
+    "single_edge_notch": Shape(single_edge_notch_mesh, {
+        "coarse": {"h": 0.1 / 1.5}, "M3": {"h": 0.0331}, "M4": {"h": 0.02505}, "M5": {"h": 0.0202}}),
+    "simple_shear": Shape(simple_shear_mesh, {
+        "coarse": {"h": 0.025, "half_width": 0.25}, "M4": {"h": 0.025, "half_width": 1.0},
+        "paper": {"h": 0.01765, "half_width": 4.0}}),
+    "symmetric_double_edge_notch": Shape(symmetric_double_edge_notch_mesh, {
+        "coarse": {"h": 0.1 / 1.5}, "mirror": {"h": 0.1 / 1.5, "mirror": True}, "M4": {"h": 0.025},
+        "paper": {"h": 0.02}}),
+    "asymmetric_double_edge_notch": Shape(asymmetric_double_edge_notch_mesh, {
+        "coarse": {"h": 0.1 / 1.5}, "M3": {"h": 0.1 / 3}, "paper": {"h": 0.02}}),
+    "dog_bone": Shape(dog_bone_mesh, {
+        "coarse": {"h": 0.1 / 1.5}, "paper": {"h": 0.02, "h_coarse": 0.0265}}),
+    "cylindrical_shell": Shape(cylindrical_shell_mesh, {
+        "coarse": {"h": 0.1 / 1.5}, "paper": {"h": 0.025}}),
+}
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Make the meshes of a sample and write them below `cases`."""
+    parser = argparse.ArgumentParser(prog="python -m skfsink.shapes", description=main.__doc__)
+    parser.add_argument("sample", choices=SHAPES)
+    parser.add_argument("--mesh", default="all", help="name of a mesh, or all of them (default)")
+    parser.add_argument("--output", type=Path, help="folder (default: cases/<sample>/meshes of the checkout)")
+    options = parser.parse_args(arguments)
+    make, settings = SHAPES[options.sample]
+    if options.mesh != "all" and options.mesh not in settings:
+        parser.error(f"--mesh must be one of {', '.join(settings)} or all")
+    folder = options.output or Path(__file__).resolve().parents[1] / "cases" / options.sample / "meshes"
+    folder.mkdir(parents=True, exist_ok=True)
+    for name in settings if options.mesh == "all" else [options.mesh]:
+        mesh = make(**settings[name])
+        write_mesh(folder / f"{name}.vtu", mesh)
+        quality = scaled_jacobian(mesh.points, mesh.cells_dict["quad"])
+        print(f"{name}: {len(quality)} elements, {len(mesh.points)} nodes, "
+              f"scaled Jacobian >= {quality.min():.3f}, 1 % quantile {np.quantile(quality, 0.01):.3f}")
+
+
+if __name__ == "__main__":
+    main()
