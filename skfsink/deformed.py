@@ -13,7 +13,8 @@ from scipy.sparse.csgraph import connected_components
 from .crack import CRACKED
 from .space import Space
 
-__all__ = ["OBLIQUE", "SPENT", "Body", "Frame", "View", "bodies", "body", "live_elements"]
+__all__ = ["FACETS", "OBLIQUE", "SPENT", "Body", "Frame", "View", "bodies", "body", "extent", "live_elements",
+           "outer_facets"]
 
 View = tuple[float, float]          # azimuth and elevation [degrees] from which a body in space is seen
 OBLIQUE = (-75.0, 60.0)
@@ -22,7 +23,7 @@ LONGEST = 3.0       # stretch of an edge beyond which an element is torn
 LEAST_PIECE = 0.02  # of the body; smaller fragments do not widen the axes
 
 # nodes of an element are numbered lexicographically (see `space`); facets go round as seen from outside
-_FACETS = {2: np.array([[0, 1], [1, 3], [3, 2], [2, 0]]),
+FACETS = {2: np.array([[0, 1], [1, 3], [3, 2], [2, 0]]),
            3: np.array([[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]])}
 _LIGHT = np.array([-0.3, 0.4, 0.87])  # towards the light: right, up, out of the picture
 
@@ -35,6 +36,7 @@ class Frame:
     ----------
     time: [s]; NaN where time means nothing.   label: what happens then; may be empty.
     u: displacement [mm], (n, dim).   gamma: relative density, (n,).   deleted: failed elements, (ne,) bool.
+    v: velocity [mm/s], (n, dim), or None where it was not kept.
     """
 
     time: float
@@ -42,6 +44,7 @@ class Frame:
     u: np.ndarray
     gamma: np.ndarray
     deleted: np.ndarray
+    v: np.ndarray | None = None
 
     @property
     def title(self) -> str:
@@ -84,14 +87,14 @@ def bodies(space: Space, frames: Sequence[Frame], view: View) -> tuple[list[Body
 
 def body(space: Space, frame: Frame, view: View) -> Body:
     elements, x = live_elements(space, frame)
-    gamma, facets = frame.gamma[space.conn[elements]], _FACETS[space.dim]
+    gamma, facets = frame.gamma[space.conn[elements]], FACETS[space.dim]
     if space.dim == 2:
-        edge = _outer(space, np.arange(space.n_elements))[elements] & (gamma[:, facets].min(axis=2) >= CRACKED)
+        edge = outer_facets(space, np.arange(space.n_elements))[elements] & (gamma[:, facets].min(axis=2) >= CRACKED)
         faces = np.dstack([x, gamma, np.ones_like(gamma)])[:, [0, 1, 3, 2]]
-        return Body(_triangles(faces), x[:, facets][edge], _box(space, elements, x, gamma))
+        return Body(_triangles(faces), x[:, facets][edge], extent(space, elements, x, gamma))
     (ca, ce), (sa, se) = np.cos(np.radians(view)), np.sin(np.radians(view))
     x = x @ np.array([[-sa, ca, 0], [-ca * se, -sa * se, ce], [ca * ce, sa * ce, se]]).T  # right, up, to the observer
-    box, surface = _box(space, elements, x[:, :, :2], gamma), _outer(space, elements)
+    box, surface = extent(space, elements, x[:, :, :2], gamma), outer_facets(space, elements)
     x, gamma = x[:, facets][surface], gamma[:, facets][surface]
     normal = np.cross(x[:, 2] - x[:, 0], x[:, 3] - x[:, 1])
     light = 0.65 + 0.35 * np.clip(normal @ _LIGHT / np.linalg.norm(normal, axis=1), 0, 1)
@@ -117,15 +120,15 @@ def _triangles(faces: np.ndarray) -> np.ndarray:
     return np.concatenate(kept)[np.argsort(order, kind="stable")]
 
 
-def _outer(space: Space, elements: np.ndarray) -> np.ndarray:
+def outer_facets(space: Space, elements: np.ndarray) -> np.ndarray:
     """Which facets of the elements, (nl, facets), are shared with no other of them."""
-    nodes = np.sort(space.conn[elements][:, _FACETS[space.dim]], axis=2)
+    nodes = np.sort(space.conn[elements][:, FACETS[space.dim]], axis=2)
     key = nodes[:, :, :space.dim] @ space.n_nodes ** np.arange(space.dim)  # as many nodes as tell facets apart
     _, inverse, counts = np.unique(key, return_inverse=True, return_counts=True)
     return np.asarray(counts[inverse] == 1).reshape(key.shape)
 
 
-def _box(space: Space, elements: np.ndarray, x: np.ndarray, gamma: np.ndarray) -> np.ndarray:
+def extent(space: Space, elements: np.ndarray, x: np.ndarray, gamma: np.ndarray) -> np.ndarray:
     """Least and greatest x, y (2, 2) of the pieces of the body that are not small fragments."""
     element, corner = np.nonzero(gamma >= SPENT)
     touches = csr_array((np.ones(len(element), np.int8), (element, space.conn[elements[element], corner])))

@@ -24,8 +24,9 @@ _WORDS = {"onset": "onset", "branching": "first branches", "arrival": "first arr
 def read_frame(path: Path, time: float, label: str, dim: int) -> Frame:
     """A frame of the ParaView series as the fields to draw."""
     data = meshio.read(path)
-    return Frame(time, label, np.asarray(data.point_data["displacement"], float)[:, :dim],
-                 np.asarray(data.point_data["gamma"], float), np.asarray(data.cell_data["deleted"][0], bool))
+    u, v = (np.asarray(data.point_data[name], float)[:, :dim] for name in ("displacement", "velocity"))
+    return Frame(time, label, u, np.asarray(data.point_data["gamma"], float),
+                 np.asarray(data.cell_data["deleted"][0], bool), v)
 
 
 def draw_run(scene: Scene, folder: Path, recorder: Recorder) -> None:

@@ -27,8 +27,8 @@ from .deformed import OBLIQUE, Body, Frame, View
 from .output import replaced, write_atomic
 from .space import Space
 
-__all__ = ["GAMMA_MAP", "Frame", "animation", "comparison_picture", "density_picture", "ledger_picture",
-           "tip_picture"]
+__all__ = ["GAMMA_MAP", "STYLE", "Frame", "animation", "comparison_picture", "density_bar", "density_picture",
+           "draw_body", "ledger_picture", "tip_picture"]
 
 History = Mapping[str, np.ndarray]  # columns, as `output.History.load` gives them
 
@@ -48,7 +48,9 @@ STYLE: dict[Any, Any] = {
 WIDTH, TALLEST, DPI = 7.2, 9.0, 300  # size of a picture [in], dots per inch
 GIF_FRAMES = 40     # at the most, less than 3 MB
 
-def _draw(ax: Axes, body: Body, title: str) -> None:
+
+def draw_body(ax: Axes, body: Body, title: str) -> None:
+    """Relative density on a body, added to the axes."""
     points = body.triangles.reshape(-1, 4)
     colour = GAMMA_MAP(np.clip(points[:, 2], 0, 1))
     colour[:, :3] *= points[:, 3:]
@@ -62,12 +64,18 @@ def _draw(ax: Axes, body: Body, title: str) -> None:
 def _panels(axes: Sequence[Axes], bodies: Sequence[Body], titles: Sequence[str], box: np.ndarray) -> None:
     """Bodies at one scale, with titles and a colour bar."""
     for ax, body, title in zip(axes, bodies, titles):
-        _draw(ax, body, title)
+        draw_body(ax, body, title)
         ax.set(xlim=box[:, 0], ylim=box[:, 1], aspect="equal", xlabel="$x$ (mm)", ylabel="$y$ (mm)")
         ax.locator_params(nbins=5)
         if not len(body.outline):  # a body in space: the axes of the picture are not those of the body
             ax.set_axis_off()
-    bar = axes[0].figure.colorbar(ScalarMappable(cmap=GAMMA_MAP), ax=axes, aspect=25, pad=0.02, shrink=0.8)
+    density_bar(axes)
+
+
+def density_bar(axes: Sequence[Axes], **where: Any) -> None:
+    """Colour bar of gamma beside the axes; `where` is passed on to matplotlib."""
+    bar = axes[0].figure.colorbar(ScalarMappable(cmap=GAMMA_MAP), ax=axes,
+                                  **{"aspect": 25, "pad": 0.02, "shrink": 0.8, **where})
     bar.set_label(r"relative density $\gamma$")
 
 
@@ -105,7 +113,7 @@ def animation(space: Space, frames: Sequence[Frame], path: str | Path, seconds: 
     for frame in frames:
         for artist in list(ax.collections):
             artist.remove()
-        _draw(ax, deformed.body(space, frame, view), frame.title)
+        draw_body(ax, deformed.body(space, frame, view), frame.title)
         canvas.draw()
         pictures.append(Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB"))
     palette = Image.fromarray(np.concatenate([*map(np.asarray, pictures[::max(1, len(pictures) // 4)])])).quantize(128)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import importlib
 import inspect
 import shlex
+import tomllib
 from collections.abc import Callable
 from dataclasses import fields, replace
 from pathlib import Path
@@ -20,7 +22,7 @@ from .scene import Scene, read_parameters
 from .simulate import Interrupted, Simulation, onset_copy
 from .state import State
 
-__all__ = ["run_case"]
+__all__ = ["read_scene", "run_case"]
 
 SceneMaker = Callable[[dict[str, Any], Options], Scene]
 SCENE, SUMMARY = "scene.toml", "summary.json"
@@ -56,6 +58,31 @@ def run_case(case: Callable[..., Result], make_scene: SceneMaker, own: dict[str,
         begun = (folder / SCENE).exists()
         raise Interrupted("interrupted; " + (f"go on with --resume {shlex.quote(str(folder))}" if begun else
                                              "nothing was computed yet")) from None
+
+
+def read_scene(folder: Path) -> Scene:
+    """The scene of a run, made again from its `scene.toml`; options that this does not name have their defaults.
+
+    Raises
+    ------
+    OutputError
+        The folder holds no readable scene, or one of a case or with a parameter that do not exist.
+    """
+    path = folder / SCENE
+    if not path.is_file():
+        raise OutputError(f"{folder} holds no run: there is no {path}")
+    try:
+        case = str(tomllib.loads(path.read_text(encoding="utf-8"))["case"])
+        module = importlib.import_module(f"skfsink.cases.{case}")
+        stored = read_parameters(folder, case)
+        own = {name: stored.pop(name) for name in inspect.signature(getattr(module, case)).parameters
+               if name != "options"}
+        options = replace(Options(), **stored)
+    except (ModuleNotFoundError, UnicodeDecodeError, tomllib.TOMLDecodeError, AttributeError, KeyError,
+            TypeError) as error:
+        raise OutputError(f"{path} is not the scene of a run: {error}") from None
+    scene: Scene = module._scene(own, options)
+    return scene
 
 
 def _default_folder(case: str, own: dict[str, Any], options: Options) -> Path:
