@@ -1,0 +1,17 @@
+"""Fig. 7, asymmetric double-edge notched plate: geometry, cracks of both analyses on the deformed plate, and U."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from layout import script
+from plates import plate_figure
+
+
+def draw(path: Path) -> None:
+    """Draw the figure."""
+    plate_figure(path, "asymmetric_double_edge_notch")
+
+
+if __name__ == "__main__":
+    script(draw, __file__)

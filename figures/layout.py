@@ -1,0 +1,94 @@
+"""What the figures share: the page, lettered panels, densities on the deformed body, and the command line."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+from cyclopts import App
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from skfsink import deformed, plot
+from skfsink.errors import SkfsinkError
+from skfsink.output import replaced
+from skfsink.reference import Reference
+
+__all__ = ["BLUE", "DPI", "RED", "WIDTH", "Panel", "densities", "dissipation", "microseconds", "save", "script",
+           "title"]
+
+WIDTH, DPI = plot.WIDTH, plot.DPI
+RED, BLUE = "#a63d40", "#33658a"
+Panel = tuple[Reference, deformed.Frame, str]  # what is drawn, and the words above it
+HERE = Path(__file__).resolve().parent
+
+
+def title(ax: Axes, letter: str, text: str) -> None:
+    """The letter of a panel and what it shows, above its left end."""
+    ax.set_title(f"({letter}) {text}", loc="left")
+
+
+def microseconds(frame: deformed.Frame) -> str:
+    """Time of a frame since the onset."""
+    return f"{frame.time * 1e6:.0f} µs"
+
+
+def densities(axes: Sequence[Axes], panels: Sequence[Panel], letters: str) -> None:
+    """Gamma on plane bodies as they are deformed, at one scale, with axes in mm."""
+    drawn = [deformed.body(ref.space, frame, deformed.OBLIQUE) for ref, frame, _ in panels]
+    box = np.array([np.min([b.box[0] for b in drawn], axis=0), np.max([b.box[1] for b in drawn], axis=0)])
+    box += 0.02 * np.ptp(box, axis=0).max() * np.array([[-1], [1]])
+    for ax, body, letter, (_, _, text) in zip(axes, drawn, letters, panels, strict=True):
+        plot.draw_body(ax, body, "")
+        title(ax, letter, text)
+        ax.set(xlim=box[:, 0], ylim=box[:, 1], aspect="equal", xlabel="$x$ (mm)", ylabel="$y$ (mm)")
+        ax.locator_params(nbins=5)
+
+
+def dissipation(ax: Axes, dynamic: Reference, quasistatic: Reference, printed: dict[str, float]) -> None:
+    """U against the length of the crack in both analyses, and U as the paper prints it."""
+    for ref, name, colour in ((dynamic, "dynamic", RED), (quasistatic, "quasi-static", BLUE)):
+        event = ref.history["phase"] == "event"
+        length = np.maximum.accumulate(ref.history["crack_length_mm"][event])
+        ax.plot(length, ref.history["U_paper"][event], color=colour, label=name)
+        if (value := printed.get(ref.summary["analysis"])) is not None:
+            ax.axhline(value, color=colour, linestyle="--", linewidth=0.8, label=f"paper, {name}")
+    ax.set(xlabel="crack length (mm)", ylabel="dissipated energy $U$ (N mm/mm)", xlim=(0, None), ylim=(0, None),
+           box_aspect=1)
+    ax.legend(loc="upper left")
+
+
+def save(figure: Figure, path: Path) -> None:
+    """Write a PNG of `DPI` dots per inch."""
+    with replaced(path) as part:
+        figure.savefig(part, format="png", dpi=DPI, pil_kwargs={"optimize": True})
+
+
+def script(draw: Callable[[Path], None], file: str) -> None:
+    """Command line of a figure's script: `--out` names another file than the PNG beside the script."""
+    app = App(name=f"python figures/{Path(file).name}", help=(sys.modules["__main__"].__doc__ or "").strip(),
+              help_format="plaintext", version_flags=[])
+
+    default = Path(file).resolve().with_suffix(".png")
+
+    @app.default
+    def main(*, out: Path = default) -> None:
+        """Draw the figure from the reference results.
+
+        Parameters
+        ----------
+        out
+            File to write.
+        """
+        with matplotlib.rc_context(plot.STYLE):
+            draw(out)
+        print(out)
+
+    try:
+        app()
+    except SkfsinkError as error:
+        print("skfsink:", error, file=sys.stderr)
+        raise SystemExit(2) from None
