@@ -84,11 +84,12 @@ class SizeField:
         return min(self.h_coarse, self.h + self.grading * min(away, default=0.0))
 
 
-def mesh_outline(outline: Sequence[Edge], size: SizeField, *, holes: Sequence[Sequence[Edge]] = (),
-                 seed: int = 0) -> meshio.Mesh:
-    """Mesh the region inside a closed `outline` and outside of its `holes` with quadrilaterals.
+def mesh_outline(outline: Sequence[Edge], size: SizeField, *, seed: int = 0,
+                 image: Callable[[Array], Array] | None = None) -> meshio.Mesh:
+    """Mesh the region inside a closed `outline` with quadrilaterals; the boundary names become cell sets.
 
-    The boundary names become cell sets.
+    With `image`, a symmetry of points (n, 2), the element sizes have that symmetry, as :func:`completed` wants it
+    along a seam.
 
     What gmsh makes of a size field is some per cent off, by an amount that depends on the seed, and may have
     a tiny element, which would spoil the time step. Meshes are therefore made, each with its own ripple and a
@@ -96,9 +97,9 @@ def mesh_outline(outline: Sequence[Edge], size: SizeField, *, holes: Sequence[Se
     """
     scale, best, least = TYPICAL_SCALE, None, math.inf
     with _gmsh_model() as gmsh:
-        names = _add_outline(gmsh, outline, *holes)
+        names = _add_outline(gmsh, outline)
         for attempt in range(ATTEMPTS):
-            ripple = _ripple(RIPPLE_LENGTH * size.h, seed, attempt)
+            ripple = _ripple(RIPPLE_LENGTH * size.h, seed, attempt, image=image)
             points, quads, lines, triangles = _generate(gmsh, size, ripple, scale)
             ratio, miss = _judge(points, quads, size)
             if miss < least and not triangles:
@@ -138,39 +139,63 @@ def read_mesh(path: str | Path) -> meshio.Mesh:
     return mesh
 
 
-def mirrored(mesh: meshio.Mesh, axis: int, at: float) -> meshio.Mesh:
-    """The mesh with its mirror image in the line where coordinate `axis` is `at`; its cell set "mirror" goes.
+def completed(part: meshio.Mesh, seam: str, image: Callable[[Array], Array],
+              names: Mapping[str, str] | None = None) -> meshio.Mesh:
+    """A part of a symmetric mesh joined to its image; the boundary `seam`, where they meet, goes.
 
-    The nodes on the line are shared, and coordinates on both sides are mirror images to the last bit if `at` is a
-    sum of few powers of two.
+    `image` maps points (n, 2) by a reflection or half a turn that takes the seam to itself; nodes of the seam that
+    have no node as their image are moved to where they have one. `names` are those of images of boundaries that are
+    not called like the original.
     """
-    points = mesh.points.copy()
-    shared = np.abs(points[:, axis] - at) < 1e-9
-    points[shared, axis] = at
-    image = np.where(shared, np.arange(len(points)), len(points) - 1 + np.cumsum(~shared))
-    copy = points[~shared].copy()
-    copy[:, axis] = 2 * at - copy[:, axis]
-    quads, lines = mesh.cells_dict["quad"], mesh.cells_dict["line"]
-    keep = np.setdiff1d(np.arange(len(lines)), mesh.cell_sets["mirror"][1])
-    number = np.full(len(lines), -1)
-    number[keep] = np.arange(len(keep))
-    sets = {}
-    for name, (none, members) in mesh.cell_sets.items():
-        if name != "mirror":
-            sets[name] = [none, np.concatenate([number[members], number[members] + len(keep)])]
-    cells = [("quad", np.concatenate([quads, image[quads[:, ::-1]]])),
-             ("line", np.concatenate([lines[keep], image[lines[keep]]]))]
-    return meshio.Mesh(np.concatenate([points, copy]), cells, cell_sets=sets)
+    points, quads, lines = part.points.copy(), part.cells_dict["quad"], part.cells_dict["line"]
+    members = {name: np.asarray(sets[1]) for name, sets in part.cell_sets.items()}
+    joint = np.unique(lines[members.pop(seam)])
+    ends = points[joint, :2]
+    along = np.argsort(ends @ np.ptp(ends, axis=0))
+    partner = joint.copy()
+    if not np.allclose(image(ends), ends):  # the seam is turned round
+        partner[along] = joint[along[::-1]]
+    gap = float(np.linalg.norm(image(ends) - points[partner, :2], axis=1).max())
+    if gap > 0.1 * float(np.linalg.norm(np.diff(ends[along], axis=0), axis=1).min()):
+        raise MeshError(f"the nodes of the boundary {seam!r} are up to {gap:.3g} mm from their images; try another seed")
+    points[joint, :2] = (ends + image(points[partner, :2])) / 2
+    apart = np.setdiff1d(np.arange(len(points)), joint)
+    number = np.empty(len(points), int)
+    number[apart] = len(points) + np.arange(len(apart))
+    number[joint] = partner
+    copy = points[apart].copy()
+    copy[:, :2] = image(copy[:, :2])
+    joined = np.concatenate([points, copy])
+    other = number[quads]
+    if _areas(joined[other[:1]])[0] < 0:
+        other = other[:, ::-1]
+    kept = np.unique(np.concatenate([*members.values()]))
+    index = np.full(len(lines), -1)
+    index[kept] = np.arange(len(kept))
+    sets: dict[str, list[Indices]] = {}
+    for k, rename in ((0, {}), (1, names or {})):
+        for name, ids in members.items():
+            found = sets.setdefault(rename.get(name, name), [np.zeros(0, int), np.zeros(0, int)])
+            found[1] = np.concatenate([found[1], index[ids] + k * len(kept)])
+    cells = [("quad", np.concatenate([quads, other])), ("line", np.concatenate([lines[kept], number[lines[kept]]]))]
+    return meshio.Mesh(joined, cells, cell_sets=sets)
 
 
-def _ripple(length: float, *seeds: int, waves: int = 8) -> Callable[[float, float], float]:
+def _ripple(length: float, *seeds: int, waves: int = 8,
+            image: Callable[[Array], Array] | None = None) -> Callable[[float, float], float]:
     """A random smooth factor around 1: a sum of plane waves of all directions and about the given length."""
     random = np.random.default_rng([int(require("seed", seed, low=0)) for seed in seeds])
     angle, phase = random.uniform(0, 2 * np.pi, (2, waves))
     number = 2 * np.pi / length * random.uniform(0.7, 1.4, waves)
     kx, ky = number * np.cos(angle), number * np.sin(angle)
     amplitude = RIPPLE * math.sqrt(2 / waves)
-    return lambda x, y: 1 + amplitude * float(np.sin(kx * x + ky * y + phase).sum())
+
+    def factor(x: float, y: float) -> float:
+        return 1 + amplitude * float(np.sin(kx * x + ky * y + phase).sum())
+
+    if image is None:
+        return factor
+    return lambda x, y: (factor(x, y) + factor(*image(np.array([[x, y]]))[0])) / 2
 
 
 @contextmanager
@@ -192,25 +217,20 @@ def _gmsh_model() -> Iterator[Any]:
         gmsh.finalize()
 
 
-def _add_outline(gmsh: Any, *outlines: Sequence[Edge]) -> dict[int, str]:
-    """Add the surface inside the first outline without the others to the model; boundary names by curve tag."""
+def _add_outline(gmsh: Any, outline: Sequence[Edge]) -> dict[int, str]:
+    """Add the surface inside the outline to the model; returns the boundary names by curve tag."""
     occ = gmsh.model.occ
+    corners = [occ.addPoint(*edge.end, 0) for edge in outline]
     names: dict[int, str] = {}
-    loops = []
-    for outline in outlines:
-        corners = [occ.addPoint(*edge.end, 0) for edge in outline]
-        tags = []
-        for i, edge in enumerate(outline):
-            if edge.via is None:
-                tag = occ.addLine(corners[i - 1], corners[i])
-            else:
-                via = occ.addPoint(*edge.via, 0)
-                tag = occ.addCircleArc(corners[i - 1], via, corners[i], center=False)
-                occ.remove([(0, via)])
-            tags.append(tag)
-            names[tag] = edge.name
-        loops.append(occ.addCurveLoop(tags))
-    occ.addPlaneSurface(loops)
+    for i, edge in enumerate(outline):
+        if edge.via is None:
+            tag = occ.addLine(corners[i - 1], corners[i])
+        else:
+            via = occ.addPoint(*edge.via, 0)
+            tag = occ.addCircleArc(corners[i - 1], via, corners[i], center=False)
+            occ.remove([(0, via)])
+        names[tag] = edge.name
+    occ.addPlaneSurface([occ.addCurveLoop(list(names))])
     occ.synchronize()
     return names
 

@@ -17,9 +17,10 @@ import meshio
 import numpy as np
 
 from .errors import require
-from .meshing import Band, Box, Edge, SizeField, mesh_outline, mirrored, scaled_jacobian, write_mesh
+from .meshing import Band, Box, Edge, SizeField, completed, mesh_outline, scaled_jacobian, write_mesh
 
-__all__ = ["SHAPES", "Shape", "check_dog_bone", "check_plate", "check_shell"]
+__all__ = ["SHAPES", "Shape", "check_dog_bone", "check_plate", "check_shell",
+           "check_two_notches"]
 
 Point = tuple[float, float]
 
@@ -60,39 +61,46 @@ def simple_shear_mesh(*, side: float = 4.0, notch: float = 2.0, notch_width: flo
 
 def symmetric_double_edge_notch_mesh(*, side: float = 2.5, notch: float = 0.625, notch_width: float = 0.1,
                                      h: float = 0.025, h_coarse: float = 0.11, half_height: float = 0.7,
-                                     mirror: bool = False, seed: int = 0) -> meshio.Mesh:
+                                     symmetric: bool = True, seed: int = 0) -> meshio.Mesh:
     """Mesh the square plate [0, side]^2 with equal notches from the left and the right edge at mid-height.
 
-    Fine within `half_height` of mid-height between the notches. With `mirror` the right half is the mirror image of
-    the left one. The boundaries are `left`, `right`, `top`, `bottom` and `notch` (of both).
+    Fine within `half_height` of mid-height between the notches. The right half is the mirror image of the left one,
+    unless `symmetric` is false. The boundaries are `left`, `right`, `top`, `bottom` and `notch` (of both).
     """
-    check_plate(side, notch, notch_width)
-    require("notch", notch, "mm", low=0, high=side / 2, high_open=True)
+    check_two_notches(side, notch, notch_width)
     require("half-height", half_height, "mm", low=0, low_open=True)
     middle = side / 2
     size = SizeField(h, h_coarse, ((notch - 0.15, side - notch + 0.15, middle - half_height, middle + half_height),))
-    if not mirror:
+    if not symmetric:
         return mesh_outline(_double_edge_notched(side, notch, notch_width, middle, middle), size, seed=seed)
-    left = [Edge("bottom", (middle, 0)), Edge("mirror", (middle, side)), Edge("top", (0, side)),
-            *_notch_from_left(notch, notch_width, middle), Edge("left", (0, 0))]
-    return mirrored(mesh_outline(left, size, seed=seed), 0, middle)
+    half = mesh_outline(_left_half(side, notch, notch_width, middle), size, seed=seed)
+    return completed(half, "seam", lambda p: p * (-1, 1) + (side, 0), {"left": "right"})
 
 
 def asymmetric_double_edge_notch_mesh(*, side: float = 4.0, notch: float = 1.0, notch_width: float = 0.1,
                                       offset: float = 0.6, h: float = 0.025, h_coarse: float = 0.11,
-                                      half_height: float = 1.35, seed: int = 0) -> meshio.Mesh:
+                                      half_height: float = 1.35, symmetric: bool = True,
+                                      seed: int = 0) -> meshio.Mesh:
     """Mesh the square plate [0, side]^2 with a notch from each side, the right one higher by `offset`.
 
     Both are `offset`/2 from mid-height. Fine within `half_height` of mid-height, where the notches and the cracks
-    are. The boundaries are `left`, `right`, `top`, `bottom` and `notch` (of both).
+    are. The right half is the left one turned by half a turn, unless `symmetric` is false. The boundaries are
+    `left`, `right`, `top`, `bottom` and `notch` (of both).
     """
-    check_plate(side, notch, notch_width)
+    check_two_notches(side, notch, notch_width)
     require("offset", offset, "mm", low=0, high=side - 2 * notch_width, high_open=True)
     require("half-height", half_height, "mm", low=0, low_open=True)
     low, high = (side - offset) / 2, (side + offset) / 2
     corridor = (notch - 1.0, side - notch + 1.0, side / 2 - half_height, side / 2 + half_height)
-    return mesh_outline(_double_edge_notched(side, notch, notch_width, low, high),
-                        SizeField(h, h_coarse, (corridor,)), seed=seed)
+    size = SizeField(h, h_coarse, (corridor,))
+    if not symmetric:
+        return mesh_outline(_double_edge_notched(side, notch, notch_width, low, high), size, seed=seed)
+
+    def turned(points: np.ndarray) -> np.ndarray:
+        return side - points
+
+    half = mesh_outline(_left_half(side, notch, notch_width, low), size, seed=seed, image=turned)
+    return completed(half, "seam", turned, {"left": "right", "top": "bottom", "bottom": "top"})
 
 
 def dog_bone_mesh(*, length: float = 10.0, gauge_length: float = 4.0, gauge_width: float = 1.5, grip_width: float = 3.0,
@@ -100,26 +108,19 @@ def dog_bone_mesh(*, length: float = 10.0, gauge_length: float = 4.0, gauge_widt
     """Mesh the section of a dog-bone: centre at the origin, pulled along y.
 
     A gauge of `gauge_length` and `gauge_width` widens over quarter circles of radius `fillet`, tangent to it, to
-    shoulders and ends of `grip_width`. Fine in the gauge and the fillets. The boundaries are `top`, `bottom` and
-    `side`.
+    shoulders and ends of `grip_width`. Fine in the gauge and the fillets. The four quarters are mirror images of each
+    other. The boundaries are `top`, `bottom` and `side`.
     """
     check_dog_bone(length, gauge_length, gauge_width, grip_width, fillet)
     end, gauge, neck, wide = length / 2, gauge_length / 2, gauge_width / 2, grip_width / 2
     shoulder, rim, arc = gauge + fillet, neck + fillet, fillet * (1 - math.sqrt(0.5))
-    quarter = [(neck, gauge), (neck + arc, shoulder - arc), (rim, shoulder)]  # from the gauge to the shoulder
-
-    def corner(sx: int, sy: int, outward: bool) -> list[Edge]:
-        """The pieces from the gauge to the end of the sample, or back."""
-        (a, via, b) = [(sx * x, sy * y) for x, y in quarter]
-        straight = [] if math.isclose(rim, wide) else [Edge("side", (sx * wide, sy * shoulder))]
-        if outward:
-            return [Edge("side", b, via=via), *straight, Edge("side", (sx * wide, sy * end))]
-        return [Edge("side", (sx * wide, sy * shoulder)), *([Edge("side", b)] if straight else []),
-                Edge("side", a, via=via)]
-
-    outline = [Edge("bottom", (wide, -end)), *corner(1, -1, False), Edge("side", (neck, gauge)), *corner(1, 1, True),
-               Edge("top", (-wide, end)), *corner(-1, 1, False), Edge("side", (-neck, -gauge)), *corner(-1, -1, True)]
-    return mesh_outline(outline, SizeField(h, h_coarse, ((-rim, rim, -shoulder, shoulder),)), seed=seed)
+    straight = [] if math.isclose(rim, wide) else [Edge("side", (wide, shoulder))]
+    outline = [Edge("waist", (neck, 0)), Edge("side", (neck, gauge)),
+               Edge("side", (rim, shoulder), via=(neck + arc, shoulder - arc)), *straight, Edge("side", (wide, end)),
+               Edge("top", (0, end)), Edge("axis", (0, 0))]
+    quarter = mesh_outline(outline, SizeField(h, h_coarse, ((0, rim, 0, shoulder),)), seed=seed)
+    half = completed(quarter, "axis", lambda p: p * (-1, 1))
+    return completed(half, "waist", lambda p: p * (1, -1), {"top": "bottom"})
 
 
 def cylindrical_shell_mesh(*, inner_radius: float = 1.9, thickness: float = 0.1, length: float = 5.0,
@@ -128,19 +129,19 @@ def cylindrical_shell_mesh(*, inner_radius: float = 1.9, thickness: float = 0.1,
     """Mesh the unrolled mid-surface of a half cylinder, [0, pi r] x [0, length], with a slit in its middle.
 
     r is the mean radius; x is the arc and y the axis of the cylinder. The slit is `notch` long from tip to tip, along
-    the arc, with round ends of diameter `notch_width`. Fine within `half_height` of mid-length. The boundaries are
-    `top`, `bottom`, `edge` (the straight free edges) and `notch`.
+    the arc, with round ends of diameter `notch_width`. Fine within `half_height` of mid-length. The two halves along
+    the arc are mirror images. The boundaries are `top`, `bottom`, `edge` (the straight free edges) and `notch`.
     """
     check_shell(inner_radius, thickness, length, notch, notch_width)
     arc, middle = math.pi * (inner_radius + thickness / 2), length / 2
     require("half-height", half_height, "mm", low=0, low_open=True)
-    outline = [Edge("bottom", (arc, 0)), Edge("edge", (arc, length)), Edge("top", (0, length)), Edge("edge", (0, 0))]
-    r, a = notch_width / 2, notch / 2 - notch_width / 2
-    c = arc / 2
-    slit = [Edge("notch", (c + a, middle - r)), Edge("notch", (c + a, middle + r), via=(c + a + r, middle)),
-            Edge("notch", (c - a, middle + r)), Edge("notch", (c - a, middle - r), via=(c - a - r, middle))]
+    r, crown, tip = notch_width / 2, arc / 2, arc / 2 - notch / 2
+    outline = [Edge("bottom", (crown, 0)), Edge("seam", (crown, middle - r)), Edge("notch", (tip + r, middle - r)),
+               Edge("notch", (tip + r, middle + r), via=(tip, middle)), Edge("notch", (crown, middle + r)),
+               Edge("seam", (crown, length)), Edge("top", (0, length)), Edge("edge", (0, 0))]
     corridor = (0.0, arc, middle - half_height, middle + half_height)
-    return mesh_outline(outline, SizeField(h, h_coarse, (corridor,)), holes=[slit], seed=seed)
+    half = mesh_outline(outline, SizeField(h, h_coarse, (corridor,)), seed=seed)
+    return completed(half, "seam", lambda p: p * (-1, 1) + (arc, 0))
 
 
 # --- outlines ---
@@ -176,6 +177,18 @@ def _notch_from_left(notch: float, width: float, y: float) -> list[Edge]:
             Edge("notch", (notch - r, y - r), via=(notch, y)), Edge("notch", (0, y - r))]
 
 
+def check_two_notches(side: float, notch: float, notch_width: float) -> None:
+    """Refuse dimensions [mm] that are no plate with a notch from each side (ParameterError)."""
+    check_plate(side, notch, notch_width)
+    require("notch", notch, "mm", low=notch_width / 2, high=side / 2, low_open=True, high_open=True)
+
+
+def _left_half(side: float, notch: float, width: float, y: float) -> list[Edge]:
+    """Left half of a square plate with a notch from the left edge at height `y`."""
+    return [Edge("bottom", (side / 2, 0)), Edge("seam", (side / 2, side)), Edge("top", (0, side)),
+            *_notch_from_left(notch, width, y), Edge("left", (0, 0))]
+
+
 def _edge_notched(side: float, notch: float, width: float, size: SizeField, seed: int) -> meshio.Mesh:
     outline = [Edge("bottom", (side, 0)), Edge("right", (side, side)), Edge("top", (0, side)),
                *_notch_from_left(notch, width, side / 2), Edge("left", (0, 0))]
@@ -209,8 +222,7 @@ SHAPES: dict[str, Shape] = {
         "coarse": {"h": 0.025, "half_width": 0.25}, "M4": {"h": 0.025, "half_width": 1.0},
         "paper": {"h": 0.01765, "half_width": 4.0}}),
     "symmetric_double_edge_notch": Shape(symmetric_double_edge_notch_mesh, {
-        "coarse": {"h": 0.1 / 1.5}, "mirror": {"h": 0.1 / 1.5, "mirror": True}, "M4": {"h": 0.025},
-        "paper": {"h": 0.02}}),
+        "coarse": {"h": 0.1 / 1.5}, "M4": {"h": 0.025}, "paper": {"h": 0.02}}),
     "asymmetric_double_edge_notch": Shape(asymmetric_double_edge_notch_mesh, {
         "coarse": {"h": 0.1 / 1.5}, "M3": {"h": 0.1 / 3}, "paper": {"h": 0.02}}),
     "dog_bone": Shape(dog_bone_mesh, {

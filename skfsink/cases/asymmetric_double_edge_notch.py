@@ -10,7 +10,7 @@ from ..result import Result
 from ..run import run_case
 from ..sample import shape_sample
 from ..scene import Grip, Scene
-from ..shapes import check_plate
+from ..shapes import check_two_notches
 
 __all__ = ["asymmetric_double_edge_notch"]
 
@@ -61,8 +61,7 @@ def asymmetric_double_edge_notch(*, side: Annotated[float, SAMPLE] = 4.0, notch:
 
 def _scene(own: dict[str, Any], options: Options) -> Scene:
     side, notch, width = own["side"], own["notch"], own["notch_width"]
-    check_plate(side, notch, width)
-    require("notch", notch, "mm", low=width / 2, high=side / 2, low_open=True, high_open=True)
+    check_two_notches(side, notch, width)
     require("offset", own["offset"], "mm", low=0, high=side - 2 * width, high_open=True)
     speed = options.speed
     return Scene(

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from ..errors import require
 from ..options import SAMPLE, Options
 from ..result import Result
 from ..run import run_case
 from ..sample import shape_sample
 from ..scene import Grip, Scene
-from ..shapes import check_plate
+from ..shapes import check_two_notches
 
 __all__ = ["symmetric_double_edge_notch"]
 
@@ -41,8 +40,7 @@ def symmetric_double_edge_notch(*, side: Annotated[float, SAMPLE] = 2.5, notch: 
     notch_width
         Width of the notches [mm], in (0, side).
     mesh
-        "coarse" (element size l/1.5), "mirror" (l/1.5, mirror-symmetric), "M4" (l/4), "paper" (l/5), or the path of a
-        mesh file.
+        "coarse", "M4", "paper" (element size l/1.5, l/4, l/5), or the path of a mesh file.
     mesh_seed
         Another mesh of the same sizes for each number; other than 0 it needs gmsh (the mesh extra).
     options
@@ -58,9 +56,7 @@ def symmetric_double_edge_notch(*, side: Annotated[float, SAMPLE] = 2.5, notch: 
 
 
 def _scene(own: dict[str, Any], options: Options) -> Scene:
-    check_plate(own["side"], own["notch"], own["notch_width"])
-    require("notch", own["notch"], "mm", low=own["notch_width"] / 2, high=own["side"] / 2, low_open=True,
-            high_open=True)
+    check_two_notches(own["side"], own["notch"], own["notch_width"])
     speed = options.speed
     return Scene(
         case="symmetric_double_edge_notch", title="Symmetric double-edge notched plate",
