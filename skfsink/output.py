@@ -62,7 +62,7 @@ HISTORY_COLUMNS: dict[str, str] = {
 _KIND: dict[str, type] = {**dict.fromkeys(HISTORY_COLUMNS, float), "phase": str,
                           **dict.fromkeys(("step", "tips", "branches", "deleted_elements"), int)}
 _MISSING: dict[type, Any] = {str: "", int: 0, float: math.nan}
-_VTK_ORDER = {2: [0, 1, 3, 2], 3: [0, 1, 3, 2, 4, 5, 7, 6]}  # corners of `Space.conn` in the order of VTK
+VTK_ORDER = {2: [0, 1, 3, 2], 3: [0, 1, 3, 2, 4, 5, 7, 6]}  # corners of `Space.conn` in the order of VTK
 
 
 @contextmanager
@@ -202,7 +202,7 @@ class Series:
         self.folder, self.name, self.space = Path(folder), name, space
         self.times: list[float] = []
         self._points = _vectors(space.X)
-        self._cells = [("quad" if space.dim == 2 else "hexahedron", space.conn[:, _VTK_ORDER[space.dim]].astype("i4"))]
+        self._cells = [("quad" if space.dim == 2 else "hexahedron", space.conn[:, VTK_ORDER[space.dim]].astype("i4"))]
 
     @property
     def path(self) -> Path:
