@@ -13,7 +13,7 @@ from typing import Any
 import meshio
 import numpy as np
 import skfem
-from skfem.io.meshio import HEX_MAPPING
+from skfem.io.meshio import INV_HEX_MAPPING
 
 from .errors import MeshError, ParameterError, SkfsinkError, require
 from .meshing import read_mesh
@@ -160,7 +160,7 @@ def _from_meshio(name: str, data: meshio.Mesh) -> Sample:
         raise MeshError(f"mesh {name} has elements with nodes that do not exist")
     dim = 2 if kind == "quad" else 3
     points = np.asarray(data.points, float)[:, :dim]
-    connectivity = cells.T if kind == "quad" else cells[:, HEX_MAPPING[:8]].T
+    connectivity = cells.T if kind == "quad" else cells[:, INV_HEX_MAPPING[:8]].T
     try:
         space = Space(mesh_class(np.ascontiguousarray(points.T), np.ascontiguousarray(connectivity.astype(np.int64))))
     except MeshError as error:
