@@ -12,7 +12,10 @@ tip          the farthest node of an end. It is active while it is younger than 
 leading tip  the tip farthest, in a straight line, from the middle of its origin; that distance is the crack length.
 tip speed    slope of the line fitted by least squares to the crack length over the last 4 l/c_s.
 mean speed   crack length gained between its first passing l and the first arrival, over the time that took.
-first arrival  the first cracked node on a free edge, that is neither grip nor notch, farther than 3 l from an origin.
+first arrival  a connected piece of the cracked set touches the rim of the sample at two places, more than 3 l apart:
+             the crack has reached an edge, a grip or another notch, or has met the crack that came from there. The
+             rim is the outer boundary, in three dimensions without the surfaces along which a crack runs; a place is
+             a set of cracked nodes of the rim joined by edges of elements along it.
 separation   no path of uncracked nodes joins two grips.
 """
 
@@ -24,6 +27,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra
+from scipy.spatial.distance import cdist
 
 from .space import Space
 
@@ -59,14 +63,14 @@ class CrackTracker:
     space: the spaces.
     length_scale: l [mm].   shear_wave_speed: c_s [m/s].
     grips: node numbers of each grip.
-    free_edge: node numbers of the boundary that is neither grip nor notch.
+    rim: node numbers of the rim.
     """
 
     def __init__(self, space: Space, length_scale: float, shear_wave_speed: float, grips: list[np.ndarray],
-                 free_edge: np.ndarray) -> None:
+                 rim: np.ndarray) -> None:
         self.space, self.l = space, length_scale
         self._transit = length_scale / (shear_wave_speed * 1e3)   # l/c_s [s]
-        self._grips, self._free_edge = grips, free_edge
+        self._grips, self._rim = grips, rim
         rows = np.repeat(np.arange(space.n_nodes), np.diff(space.graph.indptr))
         lengths = np.linalg.norm(space.X[rows] - space.X[space.graph.indices], axis=1)
         self._graph = csr_array((np.maximum(lengths, 1e-12), space.graph.indices, space.graph.indptr),
@@ -81,17 +85,29 @@ class CrackTracker:
 
     # --- every density update ---
     def mark(self, time: float, gamma: np.ndarray) -> bool:
-        """Note nodes that cracked since the last call; True if one of them is the first arrival at a free edge."""
+        """Note nodes that cracked since the last call; True if that makes the first arrival."""
         new = (gamma < CRACKED) & np.isinf(self.cracked_at)
         if not new.any():
             return False
         self.cracked_at[new] = time
-        if self.arrival is None and new[self._free_edge].any():
-            origins = self.space.X[self.origin >= 0]
-            reached = self.space.X[self._free_edge[new[self._free_edge]]]
-            if len(origins) and (np.linalg.norm(reached[:, None] - origins[None], axis=2).min(axis=1)
-                                 > 3 * self.l).any():
-                self.arrival = time
+        if self.arrival is None and self._crosses():
+            self.arrival = time
+            return True
+        return False
+
+    def _crosses(self) -> bool:
+        """Whether a piece of the cracked set joins two places of the rim."""
+        rim = self._rim[np.isfinite(self.cracked_at[self._rim])]
+        count, place = connected_components(self._graph[rim][:, rim], directed=False)
+        if count < 2:
+            return False
+        nodes = np.flatnonzero(np.isfinite(self.cracked_at))
+        _, label = connected_components(self._graph[nodes][:, nodes], directed=False)
+        piece, X = label[np.searchsorted(nodes, rim)], self.space.X[rim]
+        for k in range(1, count):
+            here = place == k
+            rivals = (place < k) & (piece == piece[here][0])
+            if rivals.any() and cdist(X[here], X[rivals]).min() > 3 * self.l:
                 return True
         return False
 

@@ -40,11 +40,11 @@ def draw_run(scene: Scene, folder: Path, recorder: Recorder) -> None:
     keys = sorted(set(recorder.moments.values()))
     if len(keys) < 4:  # too few things happened: add the middle of the event
         keys = sorted({*keys, len(frames) // 2})
-    density_picture(space, [frames[k] for k in keys], folder / "density.png", title)
+    density_picture(space, [frames[k] for k in keys], folder / "density.png", title, scene.view)
     ledger_picture(history, folder / "energies.png", title)
     tip_picture(history, folder / "tip.png", title, np.nan if quasistatic else scene.material.shear_wave_speed,
                 np.nan if quasistatic else scene.material.rayleigh_wave_speed)
-    animation(space, frames, folder / "animation.gif")
+    animation(space, frames, folder / "animation.gif", view=scene.view)
 
 
 def _frame(recorder: Recorder, number: int, quasistatic: bool, dim: int) -> Frame:
@@ -63,4 +63,4 @@ def draw_comparison(dynamic: Result, quasistatic: Result, folder: Path) -> None:
         number = part.summary["moments"].get("arrival", part.summary["moments"]["end"])
         frames.append(read_frame(part.folder / "series" / f"run_{number:04d}.vtu", np.nan, "", space.dim))
     comparison_picture(space, frames[0], frames[1], dynamic.history, quasistatic.history, folder / "comparison.png",
-                       f"{dynamic.scene.title}, mesh {dynamic.scene.sample.name}")
+                       f"{dynamic.scene.title}, mesh {dynamic.scene.sample.name}", dynamic.scene.view)

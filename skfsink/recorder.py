@@ -35,9 +35,8 @@ class Recorder:
         self.scene, self.momentum, self.density = scene, momentum, density
         sample, space = scene.sample, scene.sample.space
         held = [sample.nodes(grip.boundary) for grip in scene.grips]
-        named = [grip.boundary for grip in scene.grips] + list(scene.notch)
         self.tracker = CrackTracker(space, scene.sink_law.length_scale, scene.material.shear_wave_speed, held,
-                                    sample.free_edge(*named))
+                                    sample.rim(*scene.faces))
         if memory is None:
             prepare_folder(folder / "series", overwrite=True)
         self.series = Series(folder / "series", "run", space)

@@ -53,15 +53,12 @@ class Sample:
                             f"{', '.join(sorted(self.boundaries)) or 'none'}")
         return self.boundaries[boundary]
 
-    def free_edge(self, *others: str) -> np.ndarray:
-        """Nodes of the outer boundary that belong to none of the boundaries `others`."""
-        mesh = self.space.mesh
-        outer = np.zeros(self.space.n_nodes, bool)
-        outer[np.unique(mesh.facets[:, mesh.boundary_facets()])] = True
-        for name in others:
-            if name in self.boundaries:
-                outer[self.boundaries[name]] = False
-        return np.flatnonzero(outer)
+    def rim(self, *faces: str) -> np.ndarray:
+        """Nodes of the outer boundary without the named `faces`, but with the edges of these."""
+        facets = self.space.mesh.facets[:, self.space.mesh.boundary_facets()]
+        for name in set(faces) & self.boundaries.keys():
+            facets = facets[:, ~np.isin(facets, self.boundaries[name]).all(axis=0)]
+        return np.unique(facets)
 
 
 def data_folder(case: str) -> Path:

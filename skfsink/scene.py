@@ -108,14 +108,15 @@ class Scene:
     parameters: the arguments of the case function, enough to make this scene again.
     sample, material, sink_law: what is computed.
     grips: the first one's reaction is the load that is reported, in the direction of its velocity.
-    notch: boundaries that are no free edges although nothing holds them.
+    faces: in three dimensions, the surfaces of a sheet along which a crack runs; they are no edges it arrives at.
+    view: azimuth and elevation [degrees] from which pictures show a body in space.
     controls: how it is computed.
     assumed: statements about lengths that the paper does not print.
 
     Raises
     ------
     MeshError
-        The mesh lacks the boundary of a grip or of the notch.
+        The mesh lacks the boundary of a grip.
     """
 
     case: str
@@ -125,13 +126,14 @@ class Scene:
     material: Material
     sink_law: SinkLaw
     grips: tuple[Grip, ...]
-    notch: tuple[str, ...] = ()
+    faces: tuple[str, ...] = ()
+    view: tuple[float, float] = (-75.0, 60.0)
     controls: Controls = field(default_factory=Controls)
     assumed: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        for boundary in (*(grip.boundary for grip in self.grips), *self.notch):
-            self.sample.nodes(boundary)
+        for grip in self.grips:
+            self.sample.nodes(grip.boundary)
 
     def part(self, analysis: str) -> Scene:
         """This scene in one of the two analyses."""

@@ -74,7 +74,8 @@ def _scene(own: dict[str, Any], options: Options) -> Scene:
         sample=shape_sample("cylindrical_shell", own,
                             lambda section: swept(section, thickness, own["layers"], rolled(radius, thickness))),
         material=options.material(), sink_law=options.sink_law(),
-        grips=(Grip("top", (0.0, 0.0, speed)), Grip("bottom", (0.0, 0.0, -speed))), notch=("notch",),
+        grips=(Grip("top", (0.0, 0.0, speed)), Grip("bottom", (0.0, 0.0, -speed))), faces=("back", "front"),
+        view=(55.0, 20.0),
         controls=options.controls(), assumed=ASSUMED)
 
 

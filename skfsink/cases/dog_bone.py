@@ -74,8 +74,8 @@ def _scene(own: dict[str, Any], options: Options) -> Scene:
         case="dog_bone", title="Dog-bone", parameters={**own, **options.parameters()},
         sample=shape_sample("dog_bone", own, lambda section: swept(section, own["thickness"], own["layers"])),
         material=options.material(), sink_law=options.sink_law(),
-        grips=(Grip("top", (0.0, speed, 0.0)), Grip("bottom", (0.0, -speed, 0.0))), controls=options.controls(),
-        assumed=ASSUMED)
+        grips=(Grip("top", (0.0, speed, 0.0)), Grip("bottom", (0.0, -speed, 0.0))), faces=("back", "front"),
+        view=(-90.0, 70.0), controls=options.controls(), assumed=ASSUMED)
 
 
 if __name__ == "__main__":

@@ -59,7 +59,7 @@ def _scene(own: dict[str, Any], options: Options) -> Scene:
     return Scene(
         case="simple_shear", title="Simple shear", parameters={**own, **options.parameters()},
         sample=shape_sample("simple_shear", own), material=options.material(), sink_law=options.sink_law(),
-        grips=(Grip("top", (options.speed, 0.0)), Grip("bottom", (0.0, 0.0))), notch=("notch",),
+        grips=(Grip("top", (options.speed, 0.0)), Grip("bottom", (0.0, 0.0))),
         controls=options.controls(), assumed=ASSUMED)
 
 

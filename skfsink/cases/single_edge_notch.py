@@ -59,7 +59,7 @@ def _scene(own: dict[str, Any], options: Options) -> Scene:
     return Scene(
         case="single_edge_notch", title="Single-edge notched plate", parameters={**own, **options.parameters()},
         sample=shape_sample("single_edge_notch", own), material=options.material(), sink_law=options.sink_law(),
-        grips=(Grip("top", (0.0, speed)), Grip("bottom", (0.0, -speed))), notch=("notch",),
+        grips=(Grip("top", (0.0, speed)), Grip("bottom", (0.0, -speed))),
         controls=options.controls(), assumed=ASSUMED)
 
 

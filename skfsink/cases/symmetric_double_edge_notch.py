@@ -62,7 +62,7 @@ def _scene(own: dict[str, Any], options: Options) -> Scene:
         case="symmetric_double_edge_notch", title="Symmetric double-edge notched plate",
         parameters={**own, **options.parameters()}, sample=shape_sample("symmetric_double_edge_notch", own),
         material=options.material(), sink_law=options.sink_law(),
-        grips=(Grip("top", (0.0, speed)), Grip("bottom", (0.0, -speed))), notch=("notch",),
+        grips=(Grip("top", (0.0, speed)), Grip("bottom", (0.0, -speed))),
         controls=options.controls(), assumed=ASSUMED)
 
 
