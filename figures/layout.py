@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -10,17 +11,20 @@ import matplotlib
 import numpy as np
 from cyclopts import App
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from PIL import Image
 
 from skfsink import deformed, plot
 from skfsink.errors import SkfsinkError
-from skfsink.output import replaced
+from skfsink.output import write_atomic
 from skfsink.reference import Reference
 
 __all__ = ["BLUE", "DPI", "RED", "WIDTH", "Panel", "densities", "dissipation", "microseconds", "save", "script",
            "title"]
 
 WIDTH, DPI = plot.WIDTH, plot.DPI
+LARGEST = 950_000  # of a file [bytes]
 RED, BLUE = "#a63d40", "#33658a"
 Panel = tuple[Reference, deformed.Frame, str]  # what is drawn, and the words above it
 HERE = Path(__file__).resolve().parent
@@ -62,9 +66,18 @@ def dissipation(ax: Axes, dynamic: Reference, quasistatic: Reference, printed: d
 
 
 def save(figure: Figure, path: Path) -> None:
-    """Write a PNG of `DPI` dots per inch."""
-    with replaced(path) as part:
-        figure.savefig(part, format="png", dpi=DPI, pil_kwargs={"optimize": True})
+    """Write a PNG of `DPI` dots per inch, with colours just coarse enough for it to stay below `LARGEST`."""
+    canvas = FigureCanvasAgg(figure)
+    figure.set_dpi(DPI)
+    canvas.draw()
+    pixels = np.asarray(canvas.buffer_rgba())[..., :3].astype(int)
+    for step in (1, 2, 3, 4, 6, 8):
+        file = io.BytesIO()
+        levels = 255 - np.rint((255 - pixels) / step) * step  # white stays white
+        Image.fromarray(np.clip(levels, 0, 255).astype(np.uint8)).save(file, "PNG", optimize=True, dpi=(DPI, DPI))
+        if file.tell() < LARGEST:
+            break
+    write_atomic(path, file.getvalue())
 
 
 def script(draw: Callable[[Path], None], file: str) -> None:

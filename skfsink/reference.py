@@ -146,6 +146,8 @@ def store(run: Path, target: Path, frames: Sequence[str], velocity: Sequence[str
             frame = read_frame(run / "series" / f"run_{number:04d}.vtu", times[number], "", space.dim)
         except Exception as error:
             raise OutputError(f"{run} lacks frame {number}, or it is damaged: {error}") from None
+        if frame.u.shape != space.X.shape or len(frame.deleted) != space.n_elements:
+            raise OutputError(f"{run} was computed on another mesh than {scene.sample.name} of {scene.case} is now")
         packed |= packer.pack(frame, f"{i}.", number in moving)
     packed["frames"] = np.frombuffer(json.dumps(
         {"phrases": {phrase: numbers.index(n) for phrase, n in chosen.items() if n is not None},
