@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from flat import plate
 from layout import WIDTH, Panel, densities, microseconds, save, script, title
 from matplotlib.figure import Figure
-from plates import plate
 
 from skfsink import plot, reference
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from flat import plate_figure
 from layout import script
-from plates import plate_figure
 
 
 def draw(path: Path) -> None:

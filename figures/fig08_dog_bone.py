@@ -20,7 +20,7 @@ def draw(path: Path) -> None:
     slow = quasistatic.frame("arrival", "end")
     box = gauge_box([(dynamic, early), (dynamic, late), (quasistatic, slow)])
     moving = [frame for frame in (early, late) if frame.v is not None]
-    largest = fastest(moving)
+    largest, running = fastest(moving), moving[0] if moving else early
     width, gap, sketch = 1.29, 0.1, 1.5
     tall = width * float(np.divide(*np.ptp(box, axis=0)[::-1]))
     page = tall + 1.0
@@ -34,7 +34,7 @@ def draw(path: Path) -> None:
     title(ax, "a", "geometry (mm)")
     panels = [("b", f"dynamic, {microseconds(early)}", dynamic, early, "gamma"),
               ("c", f"dynamic, {microseconds(late)}", dynamic, late, "gamma"),
-              ("d", f"speed, {microseconds(moving[0])}" if moving else "", dynamic, moving[0] if moving else early, "speed"),
+              ("d", f"speed, {microseconds(running)}", dynamic, running, "speed"),
               ("e", "quasi-static", quasistatic, slow, "gamma")]
     left = WIDTH - 4 * (width + gap)
     for i, (letter, text, ref, frame, field) in enumerate(panels):

@@ -34,7 +34,8 @@ def draw(path: Path) -> None:
     figure = Figure((WIDTH, page))
 
     def place(i: int) -> tuple[float, float, float, float]:
-        return (gap + i % columns * (width + gap)) / WIDTH, 1 - (i // columns + 1) * row / page, width / WIDTH, tall / page
+        left, top = gap + i % columns * (width + gap), page - (i // columns) * row
+        return left / WIDTH, (top - row) / page, width / WIDTH, tall / page
 
     gamma = [("(a)", "cracks branch", stages[0]), ("(b)", "cracks arrive", stages[1]), ("(c)", "", stages[2]),
              ("(d)", "", stages[3])]

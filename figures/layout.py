@@ -62,6 +62,7 @@ def dissipation(ax: Axes, dynamic: Reference, quasistatic: Reference, printed: d
             ax.axhline(value, color=colour, linestyle="--", linewidth=0.8, label=f"paper, {name}")
     ax.set(xlabel="crack length (mm)", ylabel="dissipated energy $U$ (N mm/mm)", xlim=(0, None), ylim=(0, None),
            box_aspect=1)
+    ax.set_ylim(0, 1.45 * ax.get_ylim()[1])  # room for the legend
     ax.legend(loc="upper left")
 
 

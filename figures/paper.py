@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-__all__ = ["ELEMENTS", "TABLE_1", "TITLES", "U"]
+__all__ = ["ELEMENTS", "SHORT", "TABLE_1", "TITLES", "U"]
 
 #: U by case and analysis: Table 1 (mesh M4), Sec. 5.2 and 5.3.
 U = {("single_edge_notch", "dynamic"): 0.064,
@@ -17,3 +17,7 @@ TITLES = {"single_edge_notch": "single-edge notch", "simple_shear": "simple shea
           "symmetric_double_edge_notch": "symmetric double-edge notch",
           "asymmetric_double_edge_notch": "asymmetric double-edge notch", "dog_bone": "dog-bone",
           "cylindrical_shell": "cylindrical shell"}
+#: The same in two lines, for axes.
+SHORT = {"single_edge_notch": "single\nedge", "simple_shear": "simple\nshear",
+         "symmetric_double_edge_notch": "sym.\ndouble", "asymmetric_double_edge_notch": "asym.\ndouble",
+         "dog_bone": "dog-\nbone", "cylindrical_shell": "shell"}

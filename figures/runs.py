@@ -33,12 +33,11 @@ class Run:
 
 @dataclass(frozen=True)
 class Scan:
-    """Runs of both analyses of one case, for `spread.csv`: the parameters that are varied, and their values."""
+    """Runs of both analyses of one case, for `spread.csv`: names of the parameters, and their values for each run."""
 
     case: str
     columns: tuple[str, ...]
     points: tuple[tuple[str | float, ...], ...]
-    arguments: tuple[str, ...] = ()
 
 
 #: The cases in the order of the paper, and the mesh of each that the figures show.
@@ -92,8 +91,9 @@ FIGURES: dict[str, tuple[str, ...]] = {
 }
 
 _SEEDS = tuple(range(1, 6))
-#: Meshes by seed, and dimensions one at a time; a row with the default dimension stands for itself in each scan.
+#: Each is a column of `spread.png`, over the last of its parameters. Meshes other than the committed ones need gmsh.
 SCANS: tuple[Scan, ...] = (
     Scan("simple_shear", ("mesh", "mesh_seed"), tuple(("M4", seed) for seed in _SEEDS)),
     Scan("symmetric_double_edge_notch", ("mesh", "mesh_seed"), tuple(("M4", seed) for seed in _SEEDS)),
+    Scan("symmetric_double_edge_notch", ("mesh", "notch"), tuple(("M4", notch) for notch in (0.5, 0.625, 0.75))),
 )

@@ -101,7 +101,7 @@ def plane_sample(ax: Axes, scene: Scene) -> float:
             arrows(ax, a, b, direction, 0.1 * size, text)
         else:  # along the edge: one long arrow above it
             foot = (a + b) / 2 - 0.25 * size * direction + 0.06 * size * outward
-            arrows(ax, foot, foot, direction, 0.5 * size, r"$\bar v$")
+            arrows(ax, foot, foot, direction, 0.5 * size, r"$\bar v$, $u_y=0$")
     ax.set(aspect="equal")
     ax.set_axis_off()
     return size

@@ -18,8 +18,8 @@ from skfsink.reference import Reference
 from skfsink.render import SPEED_MAP, Camera, bounds, render
 from skfsink.scene import Scene
 
-__all__ = ["DOG_BONE", "SHELL", "density_strip", "dog_bone", "fastest", "gauge_box", "scale_bar", "shell", "speed_strip",
-           "triad", "view"]
+__all__ = ["DOG_BONE", "SHELL", "density_strip", "dog_bone", "fastest", "gauge_box", "scale_bar", "shell",
+           "speed_strip", "triad", "view"]
 
 DOG_BONE = Camera((0.45, 0.12, 1.0))
 SHELL = Camera((-0.75, 1.0, -0.4))
@@ -126,13 +126,15 @@ def shell(ax: Axes, ref: Reference, width: float) -> None:
     radius, thickness, length, notch = (own[k] for k in ("inner_radius", "thickness", "length", "notch"))
     outer, middle = radius + thickness, length / 2
 
-    def at(angle: float, z: float, r: float = outer) -> np.ndarray:
-        return SHELL.project(np.array([r * np.cos(angle), r * np.sin(angle), z]))
+    def at(angle: float, z: float, r: float = outer) -> tuple[float, float]:
+        x, y = SHELL.project(np.array([r * np.cos(angle), r * np.sin(angle), z])).tolist()
+        return x, y
 
-    dimension(ax, at(np.pi, 0), at(np.pi, length), f"{length:g}", SHELL.project(np.array([-0.35, -0.25, 0.0])))
-    centre = SHELL.project(np.zeros(3))
+    dimension(ax, at(np.pi, 0), at(np.pi, length), f"{length:g}", SHELL.project(np.array([-0.35, -0.25, 0.0])).tolist())
+    centre = (0.0, 0.0)  # of the near end
     ax.annotate("", at(np.radians(50), 0, radius), centre, arrowprops={
-        "arrowstyle": "-|>,head_width=0.12,head_length=0.3", "linewidth": 0.6, "color": INK, "shrinkA": 0, "shrinkB": 0})
+        "arrowstyle": "-|>,head_width=0.12,head_length=0.3", "linewidth": 0.6, "color": INK, "shrinkA": 0,
+        "shrinkB": 0})
     ax.plot(*centre, "+", color=INK, markersize=4, markeredgewidth=0.6)
     ax.annotate(f"$r_i$ {radius:g}, thickness {thickness:g}", centre, (0, -4), textcoords="offset points", ha="center",
                 va="top", fontsize=7)

@@ -26,7 +26,8 @@ from .sample import data_folder
 from .scene import Scene
 from .space import Space
 
-__all__ = ["Reference", "load", "load_coarse", "pick_frame", "reference_folder", "store", "store_coarse"]
+__all__ = ["Reference", "load", "load_coarse", "pick_frame", "read_summary", "reference_folder", "store",
+           "store_coarse"]
 
 FIELDS, HISTORY = "fields.npz", "history.csv"
 COARSE = "coarse.json"
@@ -129,7 +130,7 @@ def store(run: Path, target: Path, frames: Sequence[str], velocity: Sequence[str
     OutputError
         The folder holds no finished run of one analysis, or its files cannot be read.
     """
-    summary = _summary(run / SUMMARY)
+    summary = read_summary(run)
     if "moments" not in summary:
         raise OutputError(f"{run} holds two runs; store one of dynamic, quasistatic in it")
     scene, history = read_scene(run), History.load(run / HISTORY)
@@ -162,7 +163,7 @@ def store(run: Path, target: Path, frames: Sequence[str], velocity: Sequence[str
 
 def store_coarse(run: Path, case: str) -> Path:
     """Store the summary of a run of the coarse mesh with both analyses as `coarse.json` of the case."""
-    summary = _summary(run / SUMMARY)
+    summary = read_summary(run)
     if summary.get("analysis") != "both":
         raise OutputError(f"{run} is not a run of both analyses")
     folder = reference_folder(case)
@@ -196,7 +197,7 @@ def load(case: str, key: str) -> Reference:
     folder = reference_folder(case, key)
     if not (folder / FIELDS).is_file():
         raise OutputError(f"case {case} has no reference result {key}")
-    summary, history, scene = _summary(folder / SUMMARY), History.load(folder / HISTORY), read_scene(folder)
+    summary, history, scene = read_summary(folder), History.load(folder / HISTORY), read_scene(folder)
     space = scene.sample.space
     try:
         packed, packer = unpack_file(folder / FIELDS), Packer(space)
@@ -215,10 +216,12 @@ def load(case: str, key: str) -> Reference:
 
 def load_coarse(case: str) -> dict[str, Any]:
     """The stored summary of the coarse mesh, with both analyses; OutputError if there is none."""
-    return _summary(reference_folder(case) / COARSE)
+    return read_summary(reference_folder(case), COARSE)
 
 
-def _summary(path: Path) -> dict[str, Any]:
+def read_summary(folder: Path, name: str = SUMMARY) -> dict[str, Any]:
+    """The summary of a finished run; OutputError if there is none, or it is damaged."""
+    path = folder / name
     try:
         summary = json.loads(path.read_text(encoding="utf-8"))
         if not isinstance(summary, dict) or "case" not in summary:
