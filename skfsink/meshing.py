@@ -157,7 +157,7 @@ def completed(part: meshio.Mesh, seam: str, image: Callable[[Array], Array],
         partner[along] = joint[along[::-1]]
     gap = float(np.linalg.norm(image(ends) - points[partner, :2], axis=1).max())
     if gap > 0.1 * float(np.linalg.norm(np.diff(ends[along], axis=0), axis=1).min()):
-        raise MeshError(f"the nodes of the boundary {seam!r} are up to {gap:.3g} mm from their images; try another seed")
+        raise MeshError(f"nodes of the boundary {seam!r} are {gap:.3g} mm from their images; try another seed")
     points[joint, :2] = (ends + image(points[partner, :2])) / 2
     apart = np.setdiff1d(np.arange(len(points)), joint)
     number = np.empty(len(points), int)

@@ -59,48 +59,40 @@ def simple_shear_mesh(*, side: float = 4.0, notch: float = 2.0, notch_width: flo
     return _edge_notched(side, notch, notch_width, SizeField(h, h_coarse, (tip,), (path,)), seed)
 
 
-def symmetric_double_edge_notch_mesh(*, side: float = 2.5, notch: float = 0.625, notch_width: float = 0.1,
+def symmetric_double_edge_notch_mesh(*, side: float = 3.0, notch: float = 0.5, notch_width: float = 0.1,
                                      h: float = 0.025, h_coarse: float = 0.11, half_height: float = 0.7,
-                                     symmetric: bool = True, seed: int = 0) -> meshio.Mesh:
+                                     symmetry: str = "turn", seed: int = 0) -> meshio.Mesh:
     """Mesh the square plate [0, side]^2 with equal notches from the left and the right edge at mid-height.
 
-    Fine within `half_height` of mid-height between the notches. The right half is the mirror image of the left one,
-    unless `symmetric` is false. The boundaries are `left`, `right`, `top`, `bottom` and `notch` (of both).
+    Fine within `half_height` of mid-height between the notches. The right half is the left one turned by half a turn,
+    or, with `symmetry` "mirror", its mirror image; with "none" it is a mesh of its own. The boundaries are `left`,
+    `right`, `top`, `bottom` and `notch` (of both).
     """
     check_two_notches(side, notch, notch_width)
     require("half-height", half_height, "mm", low=0, low_open=True)
     middle = side / 2
-    size = SizeField(h, h_coarse, ((notch - 0.15, side - notch + 0.15, middle - half_height, middle + half_height),))
-    if not symmetric:
-        return mesh_outline(_double_edge_notched(side, notch, notch_width, middle, middle), size, seed=seed)
-    half = mesh_outline(_left_half(side, notch, notch_width, middle), size, seed=seed)
-    return completed(half, "seam", lambda p: p * (-1, 1) + (side, 0), {"left": "right"})
+    fine = (notch - 0.15, side - notch + 0.15, middle - half_height, middle + half_height)
+    if symmetry == "mirror":
+        half = mesh_outline(_left_half(side, notch, notch_width, middle), SizeField(h, h_coarse, (fine,)), seed=seed)
+        return completed(half, "seam", lambda p: p * (-1, 1) + (side, 0), {"left": "right"})
+    return _double_edge_notched(side, notch, notch_width, 0.0, SizeField(h, h_coarse, (fine,)), symmetry, seed)
 
 
-def asymmetric_double_edge_notch_mesh(*, side: float = 4.0, notch: float = 1.0, notch_width: float = 0.1,
-                                      offset: float = 0.6, h: float = 0.025, h_coarse: float = 0.11,
-                                      half_height: float = 1.35, symmetric: bool = True,
+def asymmetric_double_edge_notch_mesh(*, side: float = 4.0, notch: float = 0.6, notch_width: float = 0.1,
+                                      offset: float = 1.0, h: float = 0.025, h_coarse: float = 0.11,
+                                      half_height: float = 1.35, symmetry: str = "turn",
                                       seed: int = 0) -> meshio.Mesh:
     """Mesh the square plate [0, side]^2 with a notch from each side, the right one higher by `offset`.
 
     Both are `offset`/2 from mid-height. Fine within `half_height` of mid-height, where the notches and the cracks
-    are. The right half is the left one turned by half a turn, unless `symmetric` is false. The boundaries are
+    are. The right half is the left one turned by half a turn, unless `symmetry` is "none". The boundaries are
     `left`, `right`, `top`, `bottom` and `notch` (of both).
     """
     check_two_notches(side, notch, notch_width)
     require("offset", offset, "mm", low=0, high=side - 2 * notch_width, high_open=True)
     require("half-height", half_height, "mm", low=0, low_open=True)
-    low, high = (side - offset) / 2, (side + offset) / 2
-    corridor = (notch - 1.0, side - notch + 1.0, side / 2 - half_height, side / 2 + half_height)
-    size = SizeField(h, h_coarse, (corridor,))
-    if not symmetric:
-        return mesh_outline(_double_edge_notched(side, notch, notch_width, low, high), size, seed=seed)
-
-    def turned(points: np.ndarray) -> np.ndarray:
-        return side - points
-
-    half = mesh_outline(_left_half(side, notch, notch_width, low), size, seed=seed, image=turned)
-    return completed(half, "seam", turned, {"left": "right", "top": "bottom", "bottom": "top"})
+    fine = (0.0, side, side / 2 - half_height, side / 2 + half_height)
+    return _double_edge_notched(side, notch, notch_width, offset, SizeField(h, h_coarse, (fine,)), symmetry, seed)
 
 
 def dog_bone_mesh(*, length: float = 10.0, gauge_length: float = 4.0, gauge_width: float = 1.5, grip_width: float = 3.0,
@@ -195,13 +187,23 @@ def _edge_notched(side: float, notch: float, width: float, size: SizeField, seed
     return mesh_outline(outline, size, seed=seed)
 
 
-def _double_edge_notched(side: float, notch: float, width: float, left: float, right: float) -> list[Edge]:
-    """Square plate with notches from the left and the right edge at these heights."""
+def _double_edge_notched(side: float, notch: float, width: float, offset: float, size: SizeField, symmetry: str,
+                         seed: int) -> meshio.Mesh:
+    """Square plate with notches from the left and the right edge, the right one higher by `offset`."""
+    left, right = (side - offset) / 2, (side + offset) / 2
+
+    def turned(points: np.ndarray) -> np.ndarray:
+        return side - points
+
+    if symmetry == "turn":
+        half = mesh_outline(_left_half(side, notch, width, left), size, seed=seed, image=turned)
+        return completed(half, "seam", turned, {"left": "right", "top": "bottom", "bottom": "top"})
     r, tip = width / 2, side - notch
-    return [Edge("bottom", (side, 0)), Edge("right", (side, right - r)), Edge("notch", (tip + r, right - r)),
-            Edge("notch", (tip + r, right + r), via=(tip, right)), Edge("notch", (side, right + r)),
-            Edge("right", (side, side)), Edge("top", (0, side)), *_notch_from_left(notch, width, left),
-            Edge("left", (0, 0))]
+    return mesh_outline(
+        [Edge("bottom", (side, 0)), Edge("right", (side, right - r)), Edge("notch", (tip + r, right - r)),
+         Edge("notch", (tip + r, right + r), via=(tip, right)), Edge("notch", (side, right + r)),
+         Edge("right", (side, side)), Edge("top", (0, side)), *_notch_from_left(notch, width, left),
+         Edge("left", (0, 0))], size, seed=seed)
 
 
 # --- the committed meshes ---
@@ -222,7 +224,8 @@ SHAPES: dict[str, Shape] = {
         "coarse": {"h": 0.025, "half_width": 0.25}, "M4": {"h": 0.025, "half_width": 1.0},
         "paper": {"h": 0.01765, "half_width": 4.0}}),
     "symmetric_double_edge_notch": Shape(symmetric_double_edge_notch_mesh, {
-        "coarse": {"h": 0.1 / 1.5}, "M4": {"h": 0.025}, "paper": {"h": 0.02}}),
+        "coarse": {"h": 0.1 / 1.5}, "mirror": {"h": 0.1 / 1.5, "symmetry": "mirror"}, "M4": {"h": 0.025},
+        "paper": {"h": 0.02}}),
     "asymmetric_double_edge_notch": Shape(asymmetric_double_edge_notch_mesh, {
         "coarse": {"h": 0.1 / 1.5}, "M3": {"h": 0.1 / 3}, "paper": {"h": 0.02}}),
     "dog_bone": Shape(dog_bone_mesh, {

@@ -22,9 +22,9 @@ ASSUMED = (
 )
 
 
-def asymmetric_double_edge_notch(*, side: Annotated[float, SAMPLE] = 4.0, notch: Annotated[float, SAMPLE] = 1.0,
+def asymmetric_double_edge_notch(*, side: Annotated[float, SAMPLE] = 4.0, notch: Annotated[float, SAMPLE] = 0.6,
                                  notch_width: Annotated[float, SAMPLE] = 0.1,
-                                 offset: Annotated[float, SAMPLE] = 0.6, mesh: Annotated[str, SAMPLE] = "M3",
+                                 offset: Annotated[float, SAMPLE] = 1.0, mesh: Annotated[str, SAMPLE] = "M3",
                                  mesh_seed: Annotated[int, SAMPLE] = 0,
                                  options: Options = Options()) -> Result:  # noqa: B008
     """Pull a square plate with a low notch on its left and a high one on its right apart, and watch the cracks.

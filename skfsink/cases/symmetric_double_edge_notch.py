@@ -22,7 +22,7 @@ ASSUMED = (
 )
 
 
-def symmetric_double_edge_notch(*, side: Annotated[float, SAMPLE] = 2.5, notch: Annotated[float, SAMPLE] = 0.625,
+def symmetric_double_edge_notch(*, side: Annotated[float, SAMPLE] = 3.0, notch: Annotated[float, SAMPLE] = 0.5,
                                 notch_width: Annotated[float, SAMPLE] = 0.1, mesh: Annotated[str, SAMPLE] = "M4",
                                 mesh_seed: Annotated[int, SAMPLE] = 0,
                                 options: Options = Options()) -> Result:  # noqa: B008
