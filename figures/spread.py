@@ -20,7 +20,6 @@ from cyclopts import App, Parameter
 from layout import BLUE, RED, WIDTH, save
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 from runs import SCANS, Scan
 
 from skfsink import plot, reference
@@ -112,12 +111,12 @@ def draw(path: Path) -> None:
     axes = figure.subplots(2, len(found), squeeze=False, sharey="row", height_ratios=[3, 2])
     for i, (scan, rows) in enumerate(found.items()):
         _column(axes[0, i], axes[1, i], scan, rows)
-        axes[0, i].set_title(f"({'abcdefgh'[i]}) {paper.TITLES[scan.case]}", loc="left")
+        axes[0, i].set_title(f"({'abcdefgh'[i]}) {paper.SHORT[scan.case].replace(chr(10), ' ')}", loc="left")
     for ax in axes[:, 0]:
-        ax.set_ylim(0, 1.3 * ax.get_ylim()[1])
+        ax.set_ylim(0, 1.05 * ax.get_ylim()[1])
     axes[0, 0].set_ylabel("$U$ at arrival (N mm/mm)")
     axes[1, 0].set_ylabel("dynamic over\nquasi-static")
-    axes[0, 0].legend(loc="upper left", ncols=2)
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
     save(figure, path)
 
 
@@ -134,16 +133,18 @@ def _column(top: Axes, low: Axes, scan: Scan, rows: list[Row]) -> None:
             top.axhline(value, color=colour, linestyle="--", linewidth=0.8, label=f"paper, {label}")
     ratios = dynamic / slow
     low.plot(x, ratios, "D", color="0.25", markersize=4)
-    low.axhline(ratios.mean(), color="0.25", linewidth=0.8, label=f"mean {ratios.mean():.2f}")
+    low.axhline(ratios.mean(), color="0.25", linewidth=0.8)
+    text = f"mean {ratios.mean():.2f} (solid)"
     if printed["dynamic"] is not None and printed["quasistatic"] is not None:
         ratio = printed["dynamic"] / printed["quasistatic"]
-        low.axhline(ratio, color="0.25", linestyle="--", linewidth=0.8, label=f"paper {ratio:.2f}")
-    low.legend(loc="lower left", ncols=2)
+        low.axhline(ratio, color="0.25", linestyle="--", linewidth=0.8)
+        text += f", paper {ratio:.2f} (dashed)"
+    low.set_title(text, fontsize=7, loc="left")
     seeds = name == "mesh_seed"
     low.set_xlabel(f"number of the mesh ({rows[0]['mesh']})" if seeds else name.replace("_", " ") + " (mm)")
     for ax in (top, low):
         ax.margins(x=0.15)
-        ax.xaxis.set_major_locator(MaxNLocator(5, integer=seeds))
+        ax.set_xticks(sorted(set(x)) if len(set(x)) < 7 else ax.get_xticks())
     top.tick_params(labelbottom=False)
 
 

@@ -6,6 +6,8 @@ and a few frames of its fields, rounded and packed (see `packing`), in `fields.n
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
 import re
 import xml.etree.ElementTree as ET
@@ -143,10 +145,7 @@ def store(run: Path, target: Path, frames: Sequence[str], velocity: Sequence[str
     packer = Packer(space)
     packed = {"mesh": np.array([packer.checksum])}
     for i, number in enumerate(numbers):
-        try:
-            frame = read_frame(run / "series" / f"run_{number:04d}.vtu", times[number], "", space.dim)
-        except Exception as error:
-            raise OutputError(f"{run} lacks frame {number}, or it is damaged: {error}") from None
+        frame = _read(run, number, times[number], space.dim)
         if frame.u.shape != space.X.shape or len(frame.deleted) != space.n_elements:
             raise OutputError(f"{run} was computed on another mesh than {scene.sample.name} of {scene.case} is now")
         packed |= packer.pack(frame, f"{i}.", number in moving)
@@ -170,6 +169,16 @@ def store_coarse(run: Path, case: str) -> Path:
     folder.mkdir(parents=True, exist_ok=True)
     write_summary(folder / COARSE, summary)
     return folder / COARSE
+
+
+def _read(run: Path, number: int, time: float, dim: int) -> Frame:
+    said = io.StringIO()
+    try:
+        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):  # meshio prints, and exits
+            return read_frame(run / "series" / f"run_{number:04d}.vtu", time, "", dim)
+    except (Exception, SystemExit) as error:
+        reason = str(error) if isinstance(error, Exception) else "it cannot be read"
+        raise OutputError(f"{run} lacks frame {number}, or it is damaged: {reason.splitlines()[0]}") from None
 
 
 def _times(path: Path) -> list[float]:
