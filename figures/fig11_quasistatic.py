@@ -38,7 +38,7 @@ def draw(path: Path) -> None:
         scale_bar(ax, box, corner=(1.5, 0.03) if bone else (1.0, 0.0))
         triad(ax, camera, box, corner=(-0.35, 0.05) if bone else (0.08, -0.02))
         figure.text(left / WIDTH, (bottom + side + 0.08) / page, f"({letter}) {text}", va="bottom")
-    bar = figure.add_axes(((WIDTH - 0.55) / WIDTH, 0.2, 0.12 / WIDTH, 0.6))
+    bar = figure.add_axes(((WIDTH - 0.62) / WIDTH, 0.2, 0.12 / WIDTH, 0.6))
     figure.colorbar(ScalarMappable(cmap=GAMMA_MAP), cax=bar).set_label(r"relative density $\gamma$")
     save(figure, path)
 
