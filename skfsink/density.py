@@ -17,7 +17,8 @@ from numba import njit
 
 from . import kernels
 from .errors import ConvergenceError, ParameterError
-from .linalg import AmgCG, Factorization
+from .amg import AmgCG
+from .direct import Factorization
 from .material import SinkLaw
 from .space import Pattern, Space
 

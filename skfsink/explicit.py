@@ -27,7 +27,7 @@ from numba import njit
 from .deletion import delete_failed
 from .density import DensitySolver
 from .errors import InstabilityError, require
-from .linalg import symmetric_product
+from .direct import symmetric_product
 from .momentum import Momentum
 from .space import Pattern
 from .state import State

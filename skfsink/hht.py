@@ -25,7 +25,7 @@ import numpy as np
 from .deletion import delete_failed
 from .density import DensitySolver
 from .errors import ConvergenceError, ParameterError, require
-from .linalg import Factorization, symmetric_product
+from .direct import Factorization, symmetric_product
 from .momentum import Momentum
 from .space import Pattern
 from .state import State

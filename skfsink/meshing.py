@@ -166,9 +166,9 @@ def completed(part: meshio.Mesh, seam: str, image: Callable[[Array], Array],
     copy = points[apart].copy()
     copy[:, :2] = image(copy[:, :2])
     joined = np.concatenate([points, copy])
-    other = number[quads]
+    other, lines_there = number[quads], number[lines]
     if _areas(joined[other[:1]])[0] < 0:
-        other = other[:, ::-1]
+        other, lines_there = other[:, ::-1], lines_there[:, ::-1]
     kept = np.unique(np.concatenate([*members.values()]))
     index = np.full(len(lines), -1)
     index[kept] = np.arange(len(kept))
@@ -177,7 +177,7 @@ def completed(part: meshio.Mesh, seam: str, image: Callable[[Array], Array],
         for name, ids in members.items():
             found = sets.setdefault(rename.get(name, name), [np.zeros(0, int), np.zeros(0, int)])
             found[1] = np.concatenate([found[1], index[ids] + k * len(kept)])
-    cells = [("quad", np.concatenate([quads, other])), ("line", np.concatenate([lines[kept], number[lines[kept]]]))]
+    cells = [("quad", np.concatenate([quads, other])), ("line", np.concatenate([lines[kept], lines_there[kept]]))]
     return meshio.Mesh(joined, cells, cell_sets=sets)
 
 

@@ -70,9 +70,9 @@ class Momentum:
         """Stored energy density of the undamaged material at the last evaluation [MPa], (ne, nq)."""
         return self.tiles.untile(self.tiles.W)
 
-    def tangent(self, pattern: Pattern, u: np.ndarray) -> np.ndarray:
-        """Data of the tangent stiffness at `u` on `pattern`."""
-        return kernels.tangent(self.space, pattern, self.material, u, self.gamma, self.j_bar)
+    def tangent(self, pattern: Pattern, u: np.ndarray, convex: bool = False) -> np.ndarray:
+        """Data of the tangent stiffness at `u` on `pattern`; with `convex` one that is positive at every point."""
+        return kernels.tangent(self.space, pattern, self.material, u, self.gamma, self.j_bar, convex)
 
     def consistent_mass(self, pattern: Pattern) -> np.ndarray:
         """Data of the mass matrix of Eq. (28) on `pattern`."""

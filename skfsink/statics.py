@@ -16,7 +16,7 @@ import numpy as np
 from .deletion import delete_failed
 from .density import DensitySolver
 from .errors import ConvergenceError, require
-from .linalg import Factorization
+from .direct import Factorization
 from .momentum import Momentum
 from .space import Pattern
 from .state import State

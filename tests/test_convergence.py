@@ -11,7 +11,7 @@ from bodies import boundary, box, grid
 from skfem.helpers import dot
 
 from skfsink.density import DensitySolver
-from skfsink.linalg import Factorization
+from skfsink.direct import Factorization
 from skfsink.material import AAA, Material, NeoHookean, SinkLaw
 from skfsink.momentum import Momentum
 from skfsink.space import Pattern, Space

@@ -1,4 +1,4 @@
-"""Dog-bone in tension, in three dimensions (Sec. 5.5): straight cracks from the ends of the gauge, too short to branch."""
+"""Dog-bone in tension, in three dimensions (Sec. 5.5): straight cracks from the ends of the gauge, no branches."""
 
 from __future__ import annotations
 

@@ -33,13 +33,36 @@ SOFT_GAMMA = 1e-3
 
 
 def tangent(space: Space, pattern: Pattern, material: Material, u: np.ndarray, gamma: np.ndarray,
-            j_bar: bool = True) -> np.ndarray:
-    """Data of the tangent on `pattern` at the displacement `u` (n, dim) and Gauss point densities `gamma` (ne, nq)."""
+            j_bar: bool = True, convex: bool = False) -> np.ndarray:
+    """Data of the tangent on `pattern` at the displacement `u` (n, dim) and Gauss point densities `gamma` (ne, nq).
+
+    With `convex` the pressure in the geometric part is bounded where it would make a Gauss point unstable.
+    """
     data = np.zeros(pattern.nnz)
     loop = _tangent_2d if space.dim == 2 else _tangent_3d
     loop(material.compiled_law, material.constants, material.bulk_modulus, material.shear_modulus, space.conn,
-         space.X + u, space.dN, space.w, np.ascontiguousarray(gamma), j_bar, pattern.slot, data)
+         space.X + u, space.dN, space.w, np.ascontiguousarray(gamma), j_bar, convex, pattern.slot, data)
     return data
+
+
+@njit(fastmath={"contract", "arcp", "nsz"})
+def _greatest(F, tr):  # type: ignore[no-untyped-def]
+    """Greatest eigenvalue of C = F^T F (3, 3), whose trace is `tr`."""
+    second, third = 0.0, 0.0   # invariants of the deviator: |dev|^2 / 2 and its determinant
+    m = tr / 3.0
+    c00 = F[0, 0] ** 2 + F[1, 0] ** 2 + F[2, 0] ** 2 - m
+    c11 = F[0, 1] ** 2 + F[1, 1] ** 2 + F[2, 1] ** 2 - m
+    c22 = F[0, 2] ** 2 + F[1, 2] ** 2 + F[2, 2] ** 2 - m
+    c01 = F[0, 0] * F[0, 1] + F[1, 0] * F[1, 1] + F[2, 0] * F[2, 1]
+    c02 = F[0, 0] * F[0, 2] + F[1, 0] * F[1, 2] + F[2, 0] * F[2, 2]
+    c12 = F[0, 1] * F[0, 2] + F[1, 1] * F[1, 2] + F[2, 1] * F[2, 2]
+    second = 0.5 * (c00 * c00 + c11 * c11 + c22 * c22) + c01 * c01 + c02 * c02 + c12 * c12
+    third = c00 * (c11 * c22 - c12 * c12) - c01 * (c01 * c22 - c12 * c02) + c02 * (c01 * c12 - c11 * c02)
+    r = np.sqrt(second / 3.0)
+    if r <= 1e-12 * m:
+        return m
+    cosine = min(1.0, max(-1.0, third / (2.0 * r**3)))
+    return m + 2.0 * r * np.cos(np.arccos(cosine) / 3.0)
 
 
 def _make(dim: int) -> Callable[..., Any]:
@@ -49,14 +72,15 @@ def _make(dim: int) -> Callable[..., Any]:
     _c = types.Array
     signature = types.void(LAW, _c(float64, 1, "C"), float64, float64, _c(types.int64, 2, "C", readonly=True),
                            _c(float64, 2, "C"), _c(float64, 4, "C", readonly=True), _c(float64, 2, "C", readonly=True),
-                           _c(float64, 2, "C"), boolean, _c(types.int32, 3, "C"), _c(float64, 1, "C"))
+                           _c(float64, 2, "C"), boolean, boolean, _c(types.int32, 3, "C"), _c(float64, 1, "C"))
 
     @njit(signature, cache=True, fastmath={"contract", "arcp", "nsz", "reassoc"}, nogil=True)
-    def loop(law, constants, k_bulk, mu, conn, x, dN, w, gamma, j_bar, slot, data):  # type: ignore[no-untyped-def]
+    def loop(law, constants, k_bulk, mu, conn, x, dN, w, gamma, j_bar, convex, slot, data):  # type: ignore[no-untyped-def]
         K, b = np.empty((nd, nd)), np.empty(nd)
         g, nf, A, z = np.empty((na, nd)), np.empty((na, nd)), np.empty(nd), np.empty(nd)
         F, G = np.empty((3, 3)), np.empty((3, 3))
         J, tr, I1, R = np.empty(na), np.empty(na), np.empty(na), np.empty(na)
+        least = np.empty(na)
         psi, dpsi, ddpsi = np.empty(na), np.empty(na), np.empty(na)
         for e in range(conn.shape[0]):
             K[:] = 0.0
@@ -89,6 +113,7 @@ def _make(dim: int) -> Callable[..., Any]:
                 tr[q] = t
                 floored = max(det, J_FLOOR)
                 R[q] = floored ** (-2.0 / 3.0)
+                least[q] = floored if dim == 2 else floored / np.sqrt(_greatest(F, t))
                 I1[q] = R[q] * t
                 for a in range(na):
                     for i in range(dim):
@@ -118,6 +143,9 @@ def _make(dim: int) -> Callable[..., Any]:
                     wpJ, wkJJ = w[e, q] * gamma_bar * k_bulk * (mean - 1.0) * J[q], 0.0
                 else:
                     wpJ, wkJJ = wg * k_bulk * (J[q] - 1.0) * J[q], wg * k_bulk * max(J[q], J_FLOOR) ** 2
+                if convex:
+                    middle, reach = 2.0 / 3.0 * tr[q] * c1, 2.0 * c1 * least[q]
+                    wpJ = min(max(wpJ, middle - reach), middle + reach)
                 straight = 0.5 * (4.0 / 9.0 * tr[q] * c1 + wpJ + wkJJ)
                 crossed = 2.0 / 3.0 * tr[q] * c1 - wpJ
                 soft = w[e, q] * ERSATZ_STIFFNESS * mu if gamma[e, q] < SOFT_GAMMA else 0.0

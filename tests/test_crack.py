@@ -1,0 +1,82 @@
+"""The crack tracker on made-up cracks: first arrival, merging, branches, separation."""
+
+from __future__ import annotations
+
+import numpy as np
+from bodies import grid
+
+from skfsink.crack import CrackTracker
+from skfsink.space import Space
+
+L, CS = 0.1, 30.0  # length scale [mm], shear wave speed [m/s]
+H = 0.05           # element size [mm]
+
+
+def tracker(kind: str = "quad") -> tuple[CrackTracker, Space]:
+    """A plate of 2 x 1 mm (in space: one element thick), held at y = 0 and y = 1."""
+    shape = (40, 20) if kind == "quad" else (40, 20, 1)
+    space = Space(grid(kind, shape, (2.0, 1.0, 0.1)[:len(shape)]))
+    X = space.X
+    rim = np.flatnonzero((X[:, 0] < 1e-9) | (X[:, 0] > 2 - 1e-9) | (X[:, 1] < 1e-9) | (X[:, 1] > 1 - 1e-9))
+    grips = [np.flatnonzero(X[:, 1] < 1e-9), np.flatnonzero(X[:, 1] > 1 - 1e-9)]
+    return CrackTracker(space, L, CS, grips, rim), space
+
+
+def line(space: Space, x0: float, x1: float, y: float = 0.5) -> np.ndarray:
+    """gamma (n,) of a crack one row of nodes wide from x0 to x1 [mm] at height y."""
+    X = space.X
+    cut = (X[:, 0] >= x0 - 1e-9) & (X[:, 0] <= x1 + 1e-9) & (np.abs(X[:, 1] - y) < 1e-9)
+    return np.where(cut, 0.0, 1.0)
+
+
+def test_crack_arrives_at_the_opposite_edge(kind: str) -> None:
+    """Fails if the edge where it starts counts, or if the crack must pass the edge before it has arrived."""
+    track, space = tracker(kind)
+    assert not track.mark(1e-6, line(space, 0, 0.5))
+    assert not track.mark(2e-6, line(space, 0, 1.95))
+    assert track.mark(3e-6, line(space, 0, 2.0))
+    assert track.arrival == 3e-6
+    track.look(3e-6, line(space, 0, 2.0))
+    assert track.separated
+
+
+def test_cracks_arrive_when_they_meet() -> None:
+    """Fails if cracks that come from two edges are waited for at a third, which they never reach."""
+    track, space = tracker()
+    apart = np.minimum(line(space, 0, 0.9), line(space, 1.2, 2.0))
+    assert not track.mark(1e-6, apart)
+    track.look(1e-6, apart)
+    assert not track.separated
+    assert track.mark(2e-6, line(space, 0, 2.0))
+
+
+def test_second_start_is_no_arrival() -> None:
+    """Fails if a crack that starts at another edge counts as the arrival of the first one."""
+    track, space = tracker()
+    assert not track.mark(1e-6, line(space, 0, 0.3))
+    assert not track.mark(2e-6, np.minimum(line(space, 0, 0.3), line(space, 1.9, 2.0, 0.25)))
+
+
+def test_damage_along_the_mouth_is_no_arrival() -> None:
+    """Fails if the widening mouth of a crack, more than 3 l wide, counts as two places of the rim."""
+    track, space = tracker()
+    wide = np.where((space.X[:, 0] < 1e-9) & (np.abs(space.X[:, 1] - 0.5) < 0.31), 0.0, 1.0)
+    assert not track.mark(1e-6, np.minimum(wide, line(space, 0, 0.5)))
+
+
+def test_branches_and_tip_speed() -> None:
+    """Fails if a fork is not counted as two ends, roughness as one, or the speed is not that of the leading tip."""
+    track, space = tracker()
+    speed = 0.02  # mm/us, 20 m/s
+    for k in range(1, 40):
+        gamma = line(space, 0, speed * k)
+        track.mark(k * 1e-6, gamma)
+        tips = track.look(k * 1e-6, gamma)
+        assert tips.branches == 1
+    assert abs(tips.speed - 20.0) < 1.5
+    X, forked = space.X, line(space, 0, 0.8)
+    for sign in (1, -1):
+        arm = (X[:, 0] >= 0.8) & (X[:, 0] < 1.2) & (np.abs(X[:, 1] - 0.5 - sign * (X[:, 0] - 0.8)) < H / 2)
+        forked[arm | np.roll(arm, 1)] = 0.0
+    track.mark(41e-6, forked)
+    assert track.look(41e-6, forked).branches == 2
