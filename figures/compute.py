@@ -78,5 +78,8 @@ def in_parallel(work: Callable[[Item], None], items: Sequence[Item], jobs: int) 
         except SkfsinkError as error:
             return str(error)
 
-    with ThreadPoolExecutor(jobs) as pool:
+    pool = ThreadPoolExecutor(jobs)
+    try:
         return [line for line in pool.map(guarded, items) if line]
+    finally:
+        pool.shutdown(cancel_futures=True)  # after Ctrl-C, which ends the runs under way, none begins

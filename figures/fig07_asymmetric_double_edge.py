@@ -10,7 +10,7 @@ from layout import script
 
 def draw(path: Path) -> None:
     """Draw the figure."""
-    plate_figure(path, "asymmetric_double_edge_notch")
+    plate_figure(path, "asymmetric_double_edge_notch", early="growing * 0.8")
 
 
 if __name__ == "__main__":

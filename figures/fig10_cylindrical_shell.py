@@ -19,7 +19,7 @@ CASE = "cylindrical_shell"
 def draw(path: Path) -> None:
     """Draw the figure."""
     dynamic, quasistatic = (reference.load(CASE, key_of(CASE, kind)) for kind in ("dynamic", "quasistatic"))
-    stages = [dynamic.frame("branching", "growing"), dynamic.frame("arrival", "end"),
+    stages = [dynamic.frame("growing * 0.7"), dynamic.frame("arrival", "end"),
               dynamic.frame("arrival + 1e-5", "end"), dynamic.frame("arrival + 2e-5", "end")]
     slow = quasistatic.frame("arrival", "end")
     box = np.array([pick([bounds(ref.space, [frame], SHELL)[i] for ref, frame in
@@ -37,7 +37,7 @@ def draw(path: Path) -> None:
         left, top = gap + i % columns * (width + gap), page - (i // columns) * row
         return left / WIDTH, (top - row) / page, width / WIDTH, tall / page
 
-    gamma = [("(a)", "cracks branch", stages[0]), ("(b)", "cracks arrive", stages[1]), ("(c)", "", stages[2]),
+    gamma = [("(a)", "cracks run", stages[0]), ("(b)", "cracks arrive", stages[1]), ("(c)", "", stages[2]),
              ("(d)", "", stages[3])]
     ax = figure.add_axes(place(0))
     shell(ax, dynamic, width)

@@ -28,6 +28,7 @@ def draw(path: Path) -> None:
         frame, text = ref.frame("arrival", "end"), paper.TITLES[case]
         if ref.space.dim == 2:
             densities([ax], [(ref, frame, text)], letter)
+            ax.set_anchor("N")
             continue
         bone = case == "dog_bone"
         camera = DOG_BONE if bone else SHELL

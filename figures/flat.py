@@ -33,16 +33,16 @@ def plate(ax: Axes, scene: Scene) -> None:
         dimension(ax, (notch + 0.1 * size, low), (notch + 0.1 * size, high), f"{offset:g}")
 
 
-def plate_figure(path: Path, case: str) -> None:
-    """Geometry, two dynamic frames, U against crack length, two quasi-static frames."""
+def plate_figure(path: Path, case: str, early: str = "growing") -> None:
+    """Geometry, the dynamic crack at `early` and across, U against crack length, the quasi-static crack twice."""
     dynamic, quasistatic = (reference.load(case, key_of(case, kind)) for kind in ("dynamic", "quasistatic"))
     figure = Figure((WIDTH, 4.9), layout="compressed")
     axes = figure.subplots(2, 3)
     plate(axes[0, 0], dynamic.scene)
     title(axes[0, 0], "a", "geometry (mm)")
-    early, late = dynamic.frame("branching", "growing"), dynamic.frame("arrival", "end")
+    first, late = dynamic.frame(early), dynamic.frame("arrival", "end")
     panels: list[Panel] = [
-        (dynamic, early, f"dynamic, {microseconds(early)}"), (dynamic, late, f"dynamic, {microseconds(late)}"),
+        (dynamic, first, f"dynamic, {microseconds(first)}"), (dynamic, late, f"dynamic, {microseconds(late)}"),
         (quasistatic, quasistatic.frame("growing"), "quasi-static, growing"),
         (quasistatic, quasistatic.frame("arrival", "end"), "quasi-static, arrived")]
     drawn = [axes[0, 1], axes[0, 2], axes[1, 1], axes[1, 2]]

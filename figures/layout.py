@@ -6,6 +6,7 @@ import io
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import NoReturn
 
 import matplotlib
 import numpy as np
@@ -21,7 +22,7 @@ from skfsink.output import write_atomic
 from skfsink.reference import Reference
 
 __all__ = ["BLUE", "DPI", "RED", "WIDTH", "Panel", "densities", "dissipation", "microseconds", "save", "script",
-           "title"]
+           "start", "title"]
 
 WIDTH, DPI = plot.WIDTH, plot.DPI
 LARGEST = 950_000  # of a file [bytes]
@@ -67,11 +68,16 @@ def dissipation(ax: Axes, dynamic: Reference, quasistatic: Reference, printed: d
 
 
 def save(figure: Figure, path: Path) -> None:
-    """Write a PNG of `DPI` dots per inch, with colours just coarse enough for it to stay below `LARGEST`."""
+    """Write a PNG of `DPI` dots per inch, cut to its content above and below.
+
+    Its colours are just coarse enough for it to stay below `LARGEST`.
+    """
     canvas = FigureCanvasAgg(figure)
     figure.set_dpi(DPI)
     canvas.draw()
     pixels = np.asarray(canvas.buffer_rgba())[..., :3].astype(int)
+    filled, margin = np.flatnonzero((pixels < 255).any(axis=(1, 2))), DPI // 25
+    pixels = pixels[max(0, filled[0] - margin):filled[-1] + 1 + margin]
     for step in (1, 2, 3, 4, 6, 8):
         file = io.BytesIO()
         levels = 255 - np.rint((255 - pixels) / step) * step  # white stays white
@@ -101,8 +107,16 @@ def script(draw: Callable[[Path], None], file: str) -> None:
             draw(out)
         print(out)
 
+    start(app)
+
+
+def start(app: App) -> NoReturn:
+    """Run a command line; an error that can be cured is one line and exit status 2, as that of the cases."""
     try:
-        app()
+        raise SystemExit(app(result_action="return_value"))
     except SkfsinkError as error:
         print("skfsink:", error, file=sys.stderr)
         raise SystemExit(2) from None
+    except KeyboardInterrupt:
+        print("skfsink: interrupted; the same command goes on", file=sys.stderr)
+        raise SystemExit(130) from None

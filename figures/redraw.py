@@ -13,6 +13,7 @@ from typing import Annotated
 import matplotlib
 from compute import compute
 from cyclopts import App, Parameter
+from layout import start
 from runs import CASES, FIGURES, RUNS
 
 from skfsink import plot
@@ -69,8 +70,4 @@ def main(*, only: Annotated[tuple[str, ...], Parameter(consume_multiple=True, ne
 
 
 if __name__ == "__main__":
-    try:
-        raise SystemExit(app())
-    except SkfsinkError as error:
-        print("skfsink:", error, file=sys.stderr)
-        raise SystemExit(2) from None
+    start(app)

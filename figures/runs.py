@@ -43,7 +43,7 @@ class Scan:
 #: The cases in the order of the paper, and the mesh of each that the figures show.
 CASES = {"single_edge_notch": "M4", "simple_shear": "paper", "symmetric_double_edge_notch": "paper",
          "asymmetric_double_edge_notch": "paper", "dog_bone": "paper", "cylindrical_shell": "paper"}
-FLAT = ("growing", "branching", "arrival", "end")
+FLAT = ("growing", "growing * 0.8", "arrival", "end")
 SLOW = ("growing", "arrival", "end")
 
 
@@ -69,7 +69,7 @@ RUNS: tuple[Run, ...] = (
       for analysis in ("dynamic", "quasistatic")),
     _run("dog_bone", "dynamic", ("growing", "arrival", "end"), velocity=("growing", "arrival")),
     _run("dog_bone", "quasistatic", ("arrival", "end")),
-    _run("cylindrical_shell", "dynamic", ("branching", "growing", "arrival", "arrival + 1e-5", "arrival + 2e-5", "end"),
+    _run("cylindrical_shell", "dynamic", ("growing * 0.7", "arrival", "arrival + 1e-5", "arrival + 2e-5", "end"),
          velocity=("arrival", "arrival + 1e-5", "arrival + 2e-5", "end"), extra=("--aftermath", "3e-5")),
     _run("cylindrical_shell", "quasistatic", ("arrival", "end")),
 )

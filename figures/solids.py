@@ -123,6 +123,7 @@ def shell(ax: Axes, ref: Reference, width: float) -> None:
     box = bounds(space, [intact], SHELL)
     grown = np.ptp(box, axis=0) * [[-0.2, -0.16], [0.2, 0.16]] + box
     view(ax, ref, intact, SHELL, grown, width)
+    ax.set_anchor("N")
     radius, thickness, length, notch = (own[k] for k in ("inner_radius", "thickness", "length", "notch"))
     outer, middle = radius + thickness, length / 2
 

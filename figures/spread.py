@@ -17,13 +17,13 @@ import numpy as np
 import paper
 from compute import ROOT, finish, in_parallel
 from cyclopts import App, Parameter
-from layout import BLUE, RED, WIDTH, save
+from layout import BLUE, RED, WIDTH, save, start
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from runs import SCANS, Scan
 
 from skfsink import plot, reference
-from skfsink.errors import OutputError, SkfsinkError, require
+from skfsink.errors import OutputError, require
 from skfsink.output import write_atomic
 
 TABLE = "spread.csv"
@@ -172,8 +172,4 @@ def main(*, compute: Annotated[bool, Parameter(negative="")] = False, jobs: int 
 
 
 if __name__ == "__main__":
-    try:
-        raise SystemExit(app())
-    except SkfsinkError as error:
-        print("skfsink:", error, file=sys.stderr)
-        raise SystemExit(2) from None
+    start(app)

@@ -22,7 +22,7 @@ __all__ = ["DISPLACEMENT_STEP", "GAMMA_STEP", "VELOCITY_STEPS", "Packer", "pack_
 
 DISPLACEMENT_STEP = 1e-4    # [mm]; more where displacements exceed 3.2 mm
 GAMMA_STEP = 1e-3
-VELOCITY_STEPS = 4000       # in the greatest velocity component of a frame
+VELOCITY_STEPS = 1000       # in the greatest velocity component of a frame
 _LARGEST = 32000            # steps in a field
 
 
