@@ -16,9 +16,9 @@ import numpy as np
 from numba import njit
 
 from . import kernels
-from .errors import ConvergenceError, ParameterError
 from .amg import AmgCG
 from .direct import Factorization
+from .errors import ConvergenceError, ParameterError
 from .material import SinkLaw
 from .space import Pattern, Space
 

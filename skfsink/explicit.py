@@ -26,8 +26,8 @@ from numba import njit
 
 from .deletion import delete_failed
 from .density import DensitySolver
-from .errors import InstabilityError, require
 from .direct import symmetric_product
+from .errors import InstabilityError, require
 from .momentum import Momentum
 from .space import Pattern
 from .state import State

@@ -24,8 +24,8 @@ import numpy as np
 
 from .deletion import delete_failed
 from .density import DensitySolver
-from .errors import ConvergenceError, ParameterError, require
 from .direct import Factorization, symmetric_product
+from .errors import ConvergenceError, ParameterError, require
 from .momentum import Momentum
 from .space import Pattern
 from .state import State

@@ -130,6 +130,7 @@ class Simulation:
         if self.scene.controls.analysis == "quasistatic":
             state.ledger.initial = state.ledger.elastic = self.momentum.energy
         else:
+            self.statics.newton.release()
             self._make_integrator()
             assert self.integrator is not None
             self.integrator.begin(state)
@@ -198,7 +199,7 @@ class Simulation:
                 raise Interrupted("interrupted")
 
     def _solver_counts(self) -> dict[str, int]:
-        factorisations = self.statics.solver.count + self.density.factorisations
+        factorisations = self.statics.factorisations + self.density.factorisations
         if isinstance(self.integrator, HHT):
             factorisations += self.integrator.solver.count
         return {"gamma_solves": self.density.solves, "factorisations": factorisations}

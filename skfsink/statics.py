@@ -1,4 +1,4 @@
-"""Statics: Newton's method with an energy line search, loading to the onset, and quasi-static propagation.
+"""Statics: loading to the onset, and quasi-static propagation.
 
 Up to a sharp limit the loaded body is elastic and gamma hardly moves; beyond it no static solution exists. Loading
 looks for that limit, the *onset*, by bisection on the load. A quasi-static analysis then holds the grips just past
@@ -16,9 +16,8 @@ import numpy as np
 from .deletion import delete_failed
 from .density import DensitySolver
 from .errors import ConvergenceError, require
-from .direct import Factorization
 from .momentum import Momentum
-from .space import Pattern
+from .newton import Newton
 from .state import State
 
 __all__ = ["Statics", "StaticsControls"]
@@ -65,9 +64,7 @@ class Statics:
     deletion: gamma at which an element fails.
     """
 
-    LIVE = 1e-3     # nodes with less than this of their mass are not asked for equilibrium
-    KEEP = 0.2      # a factorisation is kept while each step with it lowers the residual to this fraction
-    LEAST_J = 0.05  # of a Gauss point that still carries force; below, a trial is refused
+    SNAP = 400  # Newton steps in a sweep: the body may snap to a shape far away
 
     def __init__(self, momentum: Momentum, density: DensitySolver, free: np.ndarray, grip_velocity: np.ndarray,
                  controls: StaticsControls | None = None, deletion: float = 1e-6, threads: int = 1) -> None:
@@ -76,87 +73,27 @@ class Statics:
         self.space = momentum.space
         self.free = free
         self.grip_velocity = grip_velocity
-        self.pattern = Pattern(self.space, self.space.dim, free, upper=True)
-        self.solver = Factorization(self.pattern, threads=threads)
-        self._volume = self.space.lump(np.ones_like(self.space.w))
-        # a body that has come apart bears no force; this says what counts as none
-        size = float(self.space.V.sum()) ** (1 - 1 / self.space.dim)
-        self._least_force = 1e-3 * momentum.material.shear_modulus * size
-        # rounding of the stored energy: I1' - 3 is a difference of numbers of order one
-        self._noise = 1e-14 * momentum.material.shear_modulus * float(self.space.V.sum())
-        self.newton_steps = 0
+        self.newton = Newton(momentum, free, self.controls.tolerance, self.controls.max_newton, threads)
         self.settled = False      #: whether the last sweep of `propagate` found nothing left to change
         self.increment = 0.0      #: current load increment, as load time [s]; 0 before the first
-        self._stale = True
-
-    # --- equilibrium at fixed gamma ---
-    def _live(self) -> np.ndarray:
-        live: np.ndarray = self.space.lump(self.momentum.gamma) > self.LIVE * self._volume
-        return np.repeat(live, self.space.dim)[self.free]
 
     def equilibrium(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Displacement in equilibrium at the current gamma, from the guess `u` with the grips in place, and its force.
+        """Displacement in equilibrium at the current gamma, from the guess `u`; see :meth:`.Newton.equilibrium`."""
+        return self.newton.equilibrium(u)
 
-        Raises
-        ------
-        ConvergenceError
-            No equilibrium within `max_newton` steps, or no step that lowers the energy.
-        """
-        c, live, momentum = self.controls, self._live(), self.momentum
-        u = u.copy()
-        force = momentum.force(u)
-        energy = momentum.energy
-        lowest = min(self.LEAST_J, momentum.least_J)
-        last, fresh = np.inf, False
-        for _ in range(c.max_newton):
-            r = force.ravel()[self.free]
-            error = float(np.linalg.norm(r[live]) / (np.linalg.norm(force) + self._least_force))
-            if error <= c.tolerance:
-                return u, force
-            self.newton_steps += 1
-            if self._stale or error > self.KEEP * last:
-                self.solver.factorize(momentum.tangent(self.pattern, u))
-                self._stale, fresh = False, True
-            last = error
-            d = self.solver.solve(-r, tolerance=1e-6)
-            slope = float(r @ d)
-            if slope >= 0:  # indefinite tangent: go down the gradient, scaled by the diagonal
-                diagonal = np.abs(momentum.tangent(self.pattern, u)[self.pattern.diagonal])
-                d = -r / np.maximum(diagonal, 1e-12 * diagonal.max())
-                slope = float(r @ d)
-            step = np.zeros(u.shape)
-            step.reshape(-1)[self.free] = d
-            length = 1.0
-            while True:
-                trial = momentum.force(u + length * step)
-                fits = momentum.least_J >= lowest and np.isfinite(momentum.energy)
-                if fits and momentum.energy <= energy + 1e-4 * length * slope + self._noise:
-                    break
-                length *= 0.5
-                self._stale = True
-                if length < 1e-6:
-                    if not fresh:
-                        break
-                    raise ConvergenceError("no equilibrium: the energy falls in no direction Newton's method offers")
-            if length < 1e-6:  # the direction came from an old factorisation
-                force = momentum.force(u)
-                continue
-            u += length * step
-            force, energy = trial, momentum.energy
-        raise ConvergenceError(f"no equilibrium within {c.max_newton} Newton steps")
+    @property
+    def newton_steps(self) -> int:
+        """Newton steps made so far."""
+        return self.newton.steps
+
+    @property
+    def factorisations(self) -> int:
+        """Numerical factorisations made so far."""
+        return self.newton.solver.count
 
     def _predict(self, u: np.ndarray, increment: float) -> np.ndarray:
         """`u` after moving the grips for a further load time `increment`, to first order in it."""
-        move = self.grip_velocity * increment
-        size = np.abs(move).max() + 1e-300
-        eps = 1e-6 * float(self.space.h.min()) / size
-        self.solver.factorize(self.momentum.tangent(self.pattern, u))
-        self._stale = False
-        pull = (self.momentum.force(u + eps * move) - self.momentum.force(u - eps * move)) / (2 * eps)
-        residual = self.momentum.force(u)
-        d = np.zeros(u.size)
-        d[self.free] = self.solver.solve(-(residual + pull).ravel()[self.free], tolerance=1e-6)
-        return u + move + d.reshape(u.shape)
+        return self.newton.predict(u, self.grip_velocity * increment)
 
     # --- both fields ---
     def _settle(self, state: State, u: np.ndarray) -> tuple[np.ndarray, ...] | None:
@@ -166,7 +103,7 @@ class Statics:
         last, growing = np.inf, 0
         for _ in range(c.max_passes):
             try:
-                u, force = self.equilibrium(u)
+                u, force = self.newton.equilibrium(u, max(c.tolerance, min(1e-4, 0.01 * last)))
             except ConvergenceError:
                 return None
             W = self.momentum.W
@@ -226,7 +163,7 @@ class Statics:
             yield state
 
     # --- quasi-static propagation ---
-    def propagate(self, state: State, advance: float = 0.005, limit: float = 3.0) -> Iterator[State]:
+    def propagate(self, state: State, advance: float = 0.005, limit: float = 10.0) -> Iterator[State]:
         """Let the crack run through equilibria, yielding after each sweep; the caller stops when it has crossed.
 
         A sweep: equilibrium at fixed gamma (the energy it gives up is `released`), then the history, gamma and the
@@ -247,14 +184,13 @@ class Statics:
         while True:
             self.momentum.set_gamma(state.gamma, state.deleted)
             self.momentum.force(state.u)
-            self._stale = True  # so that a sweep depends on the state alone
             if self.settled:
                 self._advance(state, advance * state.grip)
                 if state.grip > furthest:
                     raise ConvergenceError(f"the crack has not crossed the sample at {limit:g} times the onset load")
             else:
                 before = self.momentum.energy
-                state.u, _ = self.equilibrium(state.u)
+                state.u, _ = self.newton.equilibrium(state.u, most=self.SNAP)
                 ledger.released += before - self.momentum.energy
             W = self.momentum.W
             state.W_max = np.maximum(state.W_max, W)
@@ -277,7 +213,7 @@ class Statics:
         """Move the grips on by a load time `increment` at fixed gamma, to the new equilibrium."""
         held = ~self.free.reshape(state.u.shape)
         force = self.momentum.force(state.u)
-        u, new_force = self.equilibrium(self._predict(state.u, increment))
+        u, new_force = self.newton.equilibrium(self._predict(state.u, increment), most=self.SNAP)
         state.ledger.work += 0.5 * float(np.sum((force + new_force)[held] * (u - state.u)[held]))
         state.u = u
         state.grip += increment
@@ -285,9 +221,9 @@ class Statics:
     # --- checkpoints ---
     def memory(self) -> dict[str, np.ndarray]:
         """What loading remembers beyond the state."""
-        return {"increment": np.array(self.increment), "settled": np.array(self.settled)}
+        return {"increment": np.array(self.increment), "settled": np.array(self.settled), **self.newton.memory()}
 
     def restore(self, memory: dict[str, np.ndarray]) -> None:
         """Take up what :meth:`memory` gave."""
         self.increment, self.settled = float(memory["increment"]), bool(memory["settled"])
-        self._stale = True
+        self.newton.restore(memory)

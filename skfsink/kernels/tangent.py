@@ -113,7 +113,8 @@ def _make(dim: int) -> Callable[..., Any]:
                 tr[q] = t
                 floored = max(det, J_FLOOR)
                 R[q] = floored ** (-2.0 / 3.0)
-                least[q] = floored if dim == 2 else floored / np.sqrt(_greatest(F, t))
+                if convex:  # least product of two stretches that the deformation can turn
+                    least[q] = floored if dim == 2 else floored / np.sqrt(_greatest(F, t))
                 I1[q] = R[q] * t
                 for a in range(na):
                     for i in range(dim):
