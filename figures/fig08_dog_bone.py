@@ -8,9 +8,10 @@ import numpy as np
 from layout import WIDTH, microseconds, save, script, title
 from matplotlib.figure import Figure
 from runs import key_of
-from solids import DOG_BONE, density_strip, dog_bone, fastest, gauge_box, scale_bar, speed_strip, triad, view
+from solids import DOG_BONE, density_strip, dog_bone, gauge_box, scale_bar, speed_strip, triad, view
 
 from skfsink import reference
+from skfsink.deformed import fastest
 
 
 def draw(path: Path) -> None:

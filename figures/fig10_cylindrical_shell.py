@@ -8,9 +8,10 @@ import numpy as np
 from layout import WIDTH, microseconds, save, script
 from matplotlib.figure import Figure
 from runs import key_of
-from solids import SHELL, density_strip, fastest, scale_bar, shell, speed_strip, triad, view
+from solids import SHELL, density_strip, scale_bar, shell, speed_strip, triad, view
 
 from skfsink import reference
+from skfsink.deformed import fastest
 from skfsink.render import bounds
 
 CASE = "cylindrical_shell"

@@ -12,13 +12,13 @@ from matplotlib.colors import Normalize
 from matplotlib.ticker import MaxNLocator
 from sketch import INK, RED, dimension, plane_sample
 
-from skfsink.deformed import SPENT, Frame
-from skfsink.plot import GAMMA_MAP
+from skfsink.deformed import Frame
+from skfsink.plot import GAMMA_MAP, SPEED_MAP
 from skfsink.reference import Reference
-from skfsink.render import SPEED_MAP, Camera, bounds, render
+from skfsink.render import Camera, bounds, render
 from skfsink.scene import Scene
 
-__all__ = ["DOG_BONE", "SHELL", "density_strip", "dog_bone", "fastest", "gauge_box", "scale_bar", "shell",
+__all__ = ["DOG_BONE", "SHELL", "density_strip", "dog_bone", "gauge_box", "scale_bar", "shell",
            "speed_strip", "triad", "view"]
 
 DOG_BONE = Camera((0.45, 0.12, 1.0))
@@ -55,14 +55,6 @@ def triad(ax: Axes, camera: Camera, box: np.ndarray, corner: tuple[float, float]
             "color": INK})
         ax.annotate(f"${name}$", origin + tip, tuple(5 * tip / np.hypot(*tip)), textcoords="offset points", ha="center",
                     va="center", fontsize=7)
-
-
-def fastest(frames: Sequence[Frame]) -> float:
-    """A round speed [m/s] that all but the fastest few of the nodes that hold stay below."""
-    speeds = [np.linalg.norm(frame.v[frame.gamma >= SPENT], axis=1) for frame in frames if frame.v is not None]
-    top = float(np.quantile(np.concatenate(speeds), 0.999)) / 1e3 if speeds else 1.0
-    unit = 10.0 ** np.floor(np.log10(max(top, 1e-9)))
-    return float(unit * next(step for step in (1, 1.5, 2, 3, 4, 5, 6, 8, 10) if step * unit >= top))
 
 
 def density_strip(cax: Axes) -> None:

@@ -13,8 +13,8 @@ from scipy.sparse.csgraph import connected_components
 from .crack import CRACKED
 from .space import Space
 
-__all__ = ["FACETS", "OBLIQUE", "SPENT", "Body", "Frame", "View", "bodies", "body", "extent", "live_elements",
-           "outer_facets"]
+__all__ = ["FACETS", "OBLIQUE", "SPENT", "Body", "Frame", "View", "bodies", "body", "extent", "fastest",
+           "live_elements", "outer_facets", "speed"]
 
 View = tuple[float, float]          # azimuth and elevation [degrees] from which a body in space is seen
 OBLIQUE = (-75.0, 60.0)
@@ -55,7 +55,7 @@ class Frame:
 class Body(NamedTuple):
     """A frame as it is drawn."""
 
-    triangles: np.ndarray  # from back to front: x, y [mm], gamma and brightness of their corners, (nt, 3, 4)
+    triangles: np.ndarray  # from back to front: x, y [mm], gamma, brightness, colour of their corners, (nt, 3, 5)
     outline: np.ndarray    # lines along the edge of a plane body [mm], (lines, 2, 2)
     box: np.ndarray        # least and greatest x, y [mm], (2, 2)
 
@@ -76,37 +76,64 @@ def live_elements(space: Space, frame: Frame) -> tuple[np.ndarray, np.ndarray]:
     return elements[whole], x[whole]
 
 
-def bodies(space: Space, frames: Sequence[Frame], view: View) -> tuple[list[Body], np.ndarray, float]:
-    """What to draw of the frames, the limits of the axes [mm] with a margin, (2, 2), and their height over width."""
-    drawn = [body(space, frame, view) for frame in frames]
+def bodies(space: Space, frames: Sequence[Frame], view: View,
+           colours: Sequence[np.ndarray | None] | None = None) -> tuple[list[Body], np.ndarray, float]:
+    """What to draw of the frames, the limits of the axes [mm] with a margin, (2, 2), and their height over width.
+
+    `colours` are nodal values (n,) for each frame; without them it is gamma.
+    """
+    drawn = [body(space, frame, view, colour) for frame, colour in zip(frames, colours or [None] * len(frames))]
     box = np.array([np.min([b.box[0] for b in drawn], axis=0), np.max([b.box[1] for b in drawn], axis=0)])
     box += 0.02 * np.ptp(box, axis=0).max() * np.array([[-1], [1]])
     width, height = box[1] - box[0]
     return drawn, box, float(height / width)
 
 
-def body(space: Space, frame: Frame, view: View) -> Body:
+def body(space: Space, frame: Frame, view: View, colour: np.ndarray | None = None) -> Body:
+    """The frame as it is drawn, coloured by gamma or by the nodal values `colour` (n,), which cracked nodes lack."""
     elements, x = live_elements(space, frame)
     gamma, facets = frame.gamma[space.conn[elements]], FACETS[space.dim]
+    value = gamma if colour is None else _held(colour[space.conn[elements]], gamma >= CRACKED)
     if space.dim == 2:
         edge = outer_facets(space, np.arange(space.n_elements))[elements] & (gamma[:, facets].min(axis=2) >= CRACKED)
-        faces = np.dstack([x, gamma, np.ones_like(gamma)])[:, [0, 1, 3, 2]]
+        faces = np.dstack([x, gamma, np.ones_like(gamma), value])[:, [0, 1, 3, 2]]
         return Body(_triangles(faces), x[:, facets][edge], extent(space, elements, x, gamma))
     (ca, ce), (sa, se) = np.cos(np.radians(view)), np.sin(np.radians(view))
     x = x @ np.array([[-sa, ca, 0], [-ca * se, -sa * se, ce], [ca * ce, sa * ce, se]]).T  # right, up, to the observer
     box, surface = extent(space, elements, x[:, :, :2], gamma), outer_facets(space, elements)
-    x, gamma = x[:, facets][surface], gamma[:, facets][surface]
+    x, gamma, value = x[:, facets][surface], gamma[:, facets][surface], value[:, facets][surface]
     normal = np.cross(x[:, 2] - x[:, 0], x[:, 3] - x[:, 1])
     light = 0.65 + 0.35 * np.clip(normal @ _LIGHT / np.linalg.norm(normal, axis=1), 0, 1)
-    faces = np.dstack([x[:, :, :2], gamma, np.broadcast_to(light[:, None], gamma.shape)])
+    faces = np.dstack([x[:, :, :2], gamma, np.broadcast_to(light[:, None], gamma.shape), value])
     seen = np.flatnonzero(normal[:, 2] > 0)
     return Body(_triangles(faces[seen[np.argsort(x[seen, :, 2].mean(axis=1))]]), np.zeros((0, 2, 2)), box)
 
 
+def speed(frame: Frame) -> np.ndarray:
+    """Speed of the nodes [m/s], (n,)."""
+    assert frame.v is not None
+    values: np.ndarray = np.linalg.norm(frame.v, axis=1) / 1e3
+    return values
+
+
+def fastest(frames: Sequence[Frame]) -> float:
+    """A round speed [m/s] that all but the fastest few of the nodes that hold stay below."""
+    top = float(np.quantile(np.concatenate([speed(frame)[frame.gamma >= CRACKED] for frame in frames]), 0.999))
+    unit = 10.0 ** np.floor(np.log10(max(top, 1e-9)))
+    return float(unit * next(step for step in (1, 1.5, 2, 3, 4, 5, 6, 8, 10) if step * unit >= top))
+
+
+def _held(values: np.ndarray, holds: np.ndarray) -> np.ndarray:
+    """Corner values (nl, na) of elements, those of corners that do not hold replaced by the mean of the others."""
+    count = np.maximum(holds.sum(axis=1, keepdims=True), 1)
+    replaced: np.ndarray = np.where(holds, values, np.sum(values, axis=1, where=holds, keepdims=True) / count)
+    return replaced
+
+
 def _triangles(faces: np.ndarray) -> np.ndarray:
-    """Four triangles about the centre of each face (nf, 4, 4), cut off where gamma falls below `CRACKED`."""
+    """Four triangles about the centre of each face (nf, 4, 5), cut off where gamma falls below `CRACKED`."""
     centre = np.broadcast_to(faces.mean(axis=1, keepdims=True), faces.shape)
-    fan = np.stack([faces, np.roll(faces, -1, axis=1), centre], axis=2).reshape(-1, 3, 4)
+    fan = np.stack([faces, np.roll(faces, -1, axis=1), centre], axis=2).reshape(-1, 3, 5)
     above = fan[:, :, 2] >= CRACKED
     count = above.sum(axis=1)
     whole, rim = np.flatnonzero(count == 3), np.flatnonzero(count % 3)

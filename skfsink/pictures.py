@@ -9,7 +9,7 @@ import meshio
 import numpy as np
 
 from .output import History
-from .plot import Frame, animation, comparison_picture, density_picture, ledger_picture, tip_picture
+from .plot import Frame, animation, comparison_picture, density_picture, ledger_picture, speed_picture, tip_picture
 from .recorder import Recorder
 from .scene import Scene
 
@@ -30,7 +30,7 @@ def read_frame(path: Path, time: float, label: str, dim: int) -> Frame:
 
 
 def draw_run(scene: Scene, folder: Path, recorder: Recorder) -> None:
-    """`density.png`, `energies.png`, `tip.png` and `animation.gif` of a finished run."""
+    """`density.png`, `speed.png` (dynamic), `energies.png`, `tip.png` and `animation.gif` of a finished run."""
     space = scene.sample.space
     quasistatic = scene.controls.analysis == "quasistatic"
     kind = "quasi-static" if quasistatic else f"dynamic, {scene.controls.integrator}"
@@ -41,6 +41,8 @@ def draw_run(scene: Scene, folder: Path, recorder: Recorder) -> None:
     if len(keys) < 4:  # too few things happened: add the middle of the event
         keys = sorted({*keys, len(frames) // 2})
     density_picture(space, [frames[k] for k in keys], folder / "density.png", title, scene.view)
+    if not quasistatic:
+        speed_picture(space, [frames[k] for k in keys], folder / "speed.png", title, scene.view)
     ledger_picture(history, folder / "energies.png", title)
     tip_picture(history, folder / "tip.png", title, np.nan if quasistatic else scene.material.shear_wave_speed,
                 np.nan if quasistatic else scene.material.rayleigh_wave_speed)

@@ -17,7 +17,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection, TriMesh
-from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
 from matplotlib.tri import Triangulation
 from PIL import Image
@@ -28,7 +28,7 @@ from .output import replaced, write_atomic
 from .space import Space
 
 __all__ = ["GAMMA_MAP", "STYLE", "Frame", "animation", "comparison_picture", "density_bar", "density_picture",
-           "draw_body", "ledger_picture", "tip_picture"]
+           "draw_body", "ledger_picture", "speed_picture", "tip_picture"]
 
 History = Mapping[str, np.ndarray]  # columns, as `output.History.load` gives them
 
@@ -47,13 +47,15 @@ STYLE: dict[Any, Any] = {
     "xtick.major.width": 0.6, "ytick.major.width": 0.6, "lines.linewidth": 1.2}
 WIDTH, TALLEST, DPI = 7.2, 9.0, 300  # size of a picture [in], dots per inch
 GIF_FRAMES = 40     # at the most, less than 3 MB
+GAMMA_SCALE = ScalarMappable(Normalize(0, 1), GAMMA_MAP)
+SPEED_MAP = matplotlib.colormaps["viridis"]
 
 
-def draw_body(ax: Axes, body: Body, title: str) -> None:
-    """Relative density on a body, added to the axes."""
-    points = body.triangles.reshape(-1, 4)
-    colour = GAMMA_MAP(np.clip(points[:, 2], 0, 1))
-    colour[:, :3] *= points[:, 3:]
+def draw_body(ax: Axes, body: Body, title: str, scale: ScalarMappable = GAMMA_SCALE) -> None:
+    """A body, its colours (gamma, unless another `scale` says what they are) shaded by its brightness."""
+    points = body.triangles.reshape(-1, 5)
+    colour: Any = scale.to_rgba(points[:, 4])
+    colour[:, :3] *= points[:, 3:4]
     mesh = TriMesh(Triangulation(points[:, 0], points[:, 1], np.arange(len(points)).reshape(-1, 3)), rasterized=True)
     mesh.set_facecolor(colour)
     ax.add_collection(mesh, autolim=False)
@@ -62,19 +64,24 @@ def draw_body(ax: Axes, body: Body, title: str) -> None:
 
 
 def _panels(axes: Sequence[Axes], bodies: Sequence[Body], titles: Sequence[str], box: np.ndarray) -> None:
-    """Bodies at one scale, with titles and a colour bar."""
+    """Bodies at one scale, with titles and a colour bar of gamma."""
+    _bodies(axes, bodies, titles, box)
+    density_bar(axes)
+
+
+def _bodies(axes: Sequence[Axes], bodies: Sequence[Body], titles: Sequence[str], box: np.ndarray,
+            scale: ScalarMappable = GAMMA_SCALE) -> None:
     for ax, body, title in zip(axes, bodies, titles):
-        draw_body(ax, body, title)
+        draw_body(ax, body, title, scale)
         ax.set(xlim=box[:, 0], ylim=box[:, 1], aspect="equal", xlabel="$x$ (mm)", ylabel="$y$ (mm)")
         ax.locator_params(nbins=5)
         if not len(body.outline):  # a body in space: the axes of the picture are not those of the body
             ax.set_axis_off()
-    density_bar(axes)
 
 
 def density_bar(axes: Sequence[Axes], **where: Any) -> None:
     """Colour bar of gamma beside the axes; `where` is passed on to matplotlib."""
-    bar = axes[0].figure.colorbar(ScalarMappable(cmap=GAMMA_MAP), ax=axes,
+    bar = axes[0].figure.colorbar(GAMMA_SCALE, ax=axes,
                                   **{"aspect": 25, "pad": 0.02, "shrink": 0.8, **where})
     bar.set_label(r"relative density $\gamma$")
 
@@ -85,16 +92,36 @@ def density_picture(space: Space, frames: Sequence[Frame], path: str | Path, tit
                     view: View = OBLIQUE) -> None:
     """Relative density on the deformed body, a panel for each frame; cracks (gamma < 0.1) stand open."""
     bodies, box, ratio = deformed.bodies(space, frames, view)
-    n = len(frames)
-    panel = {columns: min((WIDTH - 1.3) / columns - 0.1, ((TALLEST - 0.6) * columns / n - 0.3) / ratio)  # width [in]
-             for columns in range(1, n + 1) if n % columns == 0}
-    columns = max(c for c in panel if panel[c] > 0.6 * max(panel.values()))
-    figure = Figure((WIDTH, n // columns * (panel[columns] * ratio + 0.3) + 0.6), layout="compressed")
-    axes = figure.subplots(n // columns, columns, squeeze=False).ravel().tolist()
+    figure, axes = _page(len(frames), ratio)
     _panels(axes, bodies, [frame.title for frame in frames], box)
     for ax in axes:
         ax.label_outer()
     _save(figure, path, title)
+
+
+@matplotlib.rc_context(STYLE)
+def speed_picture(space: Space, frames: Sequence[Frame], path: str | Path, title: str = "",
+                  view: View = OBLIQUE) -> None:
+    """Speed of the material on the deformed body, a panel for each frame; they must have velocities."""
+    bodies, box, ratio = deformed.bodies(space, frames, view, [deformed.speed(frame) for frame in frames])
+    scale = ScalarMappable(Normalize(0, deformed.fastest(frames)), SPEED_MAP)
+    figure, axes = _page(len(frames), ratio)
+    _bodies(axes, bodies, [frame.title for frame in frames], box, scale)
+    bar = figure.colorbar(scale, ax=axes, aspect=25, pad=0.02, shrink=0.8, extend="max")
+    bar.set_label("speed of the material (m/s)")
+    for ax in axes:
+        ax.label_outer()
+    _save(figure, path, title)
+
+
+def _page(n: int, ratio: float) -> tuple[Figure, list[Axes]]:
+    """A page with `n` panels of this height over width."""
+    panel = {columns: min((WIDTH - 1.3) / columns - 0.1, ((TALLEST - 0.6) * columns / n - 0.3) / ratio)  # width [in]
+             for columns in range(1, n + 1) if n % columns == 0}
+    columns = max(c for c in panel if panel[c] > 0.6 * max(panel.values()))
+    figure = Figure((WIDTH, n // columns * (panel[columns] * ratio + 0.3) + 0.6), layout="compressed")
+    axes: list[Axes] = figure.subplots(n // columns, columns, squeeze=False).ravel().tolist()
+    return figure, axes
 
 
 @matplotlib.rc_context(STYLE)

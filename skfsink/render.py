@@ -13,20 +13,19 @@ from typing import Any
 
 import matplotlib
 import numpy as np
-from matplotlib.colors import Colormap
 
 from . import deformed
 from .crack import CRACKED
 from .deformed import SPENT, Frame
 from .errors import MissingExtra
 from .output import VTK_ORDER
-from .plot import GAMMA_MAP
+from .plot import GAMMA_MAP, SPEED_MAP
 from .space import Space
 
-__all__ = ["SPEED_MAP", "Camera", "bounds", "render", "surface"]
+__all__ = ["Camera", "bounds", "render", "surface"]
 
 #: Colours of the speed of the material; their lightness rises throughout.
-SPEED_MAP: Colormap = matplotlib.colormaps["viridis"]
+
 LEAST_PIECE = 1e-3      # of the faces; smaller fragments are left out
 FINER = 3               # pixels rendered for one of the picture, along each side
 _LIGHTS = ((-0.4, 0.7, 1.0, 0.30), (0.5, -0.6, 0.9, 0.16))  # right, up, to the observer, strength

@@ -21,7 +21,7 @@ from .momentum import ELEMENTS
 from .sample import Sample
 from .statics import StaticsControls
 
-__all__ = ["ANALYSES", "INTEGRATORS", "Controls", "Grip", "Scene", "read_parameters"]
+__all__ = ["ANALYSES", "INTEGRATORS", "Controls", "Grip", "Scene", "choose", "read_parameters"]
 
 ANALYSES = ("dynamic", "quasistatic", "both")
 INTEGRATORS = ("explicit", "hht")

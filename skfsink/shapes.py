@@ -44,19 +44,28 @@ def single_edge_notch_mesh(*, side: float = 4.0, notch: float = 1.0, notch_width
 
 
 def simple_shear_mesh(*, side: float = 4.0, notch: float = 2.0, notch_width: float = 0.1, h: float = 0.025,
-                      h_coarse: float = 0.11, half_width: float = 0.5, seed: int = 0) -> meshio.Mesh:
+                      h_coarse: float = 0.11, half_width: float = 0.5, symmetry: str = "mirror",
+                      seed: int = 0) -> meshio.Mesh:
     """Mesh the square plate [0, side]^2 with a round-tipped notch from the left edge to the middle.
 
     Sheared to the right at its top, the plate cracks from the tip down to the right. Elements are of size `h` around
-    the tip and in a band of `half_width` on each side of that path, graded to `h_coarse` elsewhere. Boundaries as
-    those of the single-edge notched plate.
+    the tip and in a band of `half_width` on each side of that path, graded to `h_coarse` elsewhere. The upper half is
+    the mirror image of the lower one, so that the stretched and the compressed side of the tip have the same elements,
+    unless `symmetry` is "none". Boundaries as those of the single-edge notched plate.
     """
     check_plate(side, notch, notch_width)
     require("half-width", half_width, "mm", low=0, low_open=True)
-    middle = side / 2
-    tip: Box = (notch - 0.2, notch + 0.35, middle - 0.35, middle + 0.25)
-    path: Band = (notch, middle, side, middle - 0.95 * (side - notch), half_width)
-    return _edge_notched(side, notch, notch_width, SizeField(h, h_coarse, (tip,), (path,)), seed)
+    middle, r = side / 2, notch_width / 2
+    tip: Box = (notch - 0.25, notch + 0.35, middle - 0.35, middle + 0.35)
+    path: Band = (notch, middle, notch + 0.75 * middle, 0, half_width)
+    size = SizeField(h, h_coarse, (tip,), (path,))
+    if symmetry == "none":
+        return _edge_notched(side, notch, notch_width, size, seed)
+    lower = [Edge("bottom", (side, 0)), Edge("right", (side, middle)), Edge("seam", (notch, middle)),
+             Edge("notch", (notch - r, middle - r), via=(notch - r * (1 - math.sqrt(0.5)), middle - r * math.sqrt(0.5))),
+             Edge("notch", (0, middle - r)), Edge("left", (0, 0))]
+    half = mesh_outline(lower, size, seed=seed)
+    return completed(half, "seam", lambda p: p * (1, -1) + (0, side), {"bottom": "top"})
 
 
 def symmetric_double_edge_notch_mesh(*, side: float = 3.0, notch: float = 0.5, notch_width: float = 0.1,

@@ -8,7 +8,7 @@ from ..options import SAMPLE, Options
 from ..result import Result
 from ..run import run_case
 from ..sample import shape_sample
-from ..scene import Grip, Scene
+from ..scene import Grip, Scene, choose
 from ..shapes import check_plate
 
 __all__ = ["simple_shear"]
@@ -22,12 +22,13 @@ ASSUMED = (
 
 
 def simple_shear(*, side: Annotated[float, SAMPLE] = 4.0, notch: Annotated[float, SAMPLE] = 2.0,
-                 notch_width: Annotated[float, SAMPLE] = 0.1, mesh: Annotated[str, SAMPLE] = "M4",
-                 mesh_seed: Annotated[int, SAMPLE] = 0, options: Options = Options()) -> Result:  # noqa: B008
+                 notch_width: Annotated[float, SAMPLE] = 0.1, top: Annotated[str, SAMPLE] = "free",
+                 mesh: Annotated[str, SAMPLE] = "M4", mesh_seed: Annotated[int, SAMPLE] = 0,
+                 options: Options = Options()) -> Result:  # noqa: B008
     """Shear a square plate with a notch to its middle, slowly, and watch the crack.
 
-    The bottom edge is fixed; the top edge moves to the right at `speed` and keeps its height. The plate is loaded
-    statically to the onset of failure; the crack then runs dynamically or quasi-statically.
+    The bottom edge is fixed; the top edge moves to the right at `speed`. The plate is loaded statically to the onset
+    of failure; the crack then runs dynamically or quasi-statically.
 
     Parameters
     ----------
@@ -37,6 +38,8 @@ def simple_shear(*, side: Annotated[float, SAMPLE] = 4.0, notch: Annotated[float
         Length of the notch up to its round tip, at mid-height [mm], in (notch-width/2, side).
     notch_width
         Width of the notch [mm], in (0, side).
+    top
+        "free" or "held": whether the top edge may move up and down.
     mesh
         "coarse" (element size l/4 where the crack runs), "M4" (l/4, wider), "paper" (l/5.7 throughout), or the path
         of a mesh file.
@@ -50,16 +53,18 @@ def simple_shear(*, side: Annotated[float, SAMPLE] = 4.0, notch: Annotated[float
     Result
         Summary, history and last state; its files are in the output folder.
     """
-    own = {"side": side, "notch": notch, "notch_width": notch_width, "mesh": mesh, "mesh_seed": mesh_seed}
+    own = {"side": side, "notch": notch, "notch_width": notch_width, "top": top, "mesh": mesh,
+           "mesh_seed": mesh_seed}
     return run_case(simple_shear, _scene, own, options)
 
 
 def _scene(own: dict[str, Any], options: Options) -> Scene:
     check_plate(own["side"], own["notch"], own["notch_width"])
+    height = None if choose("top", own["top"], ("free", "held")) == "free" else 0.0
     return Scene(
         case="simple_shear", title="Simple shear", parameters={**own, **options.parameters()},
         sample=shape_sample("simple_shear", own), material=options.material(), sink_law=options.sink_law(),
-        grips=(Grip("top", (options.speed, 0.0)), Grip("bottom", (0.0, 0.0))),
+        grips=(Grip("top", (options.speed, height)), Grip("bottom", (0.0, 0.0))),
         controls=options.controls(), assumed=ASSUMED)
 
 
