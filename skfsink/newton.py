@@ -37,6 +37,7 @@ class Newton:
 
     LIVE = 1e-3     # nodes with less than this of their mass are not asked for equilibrium
     KEEP = 0.2      # factors are used as they are while each step with them lowers the residual to this fraction
+    FAR, NEAR = 0.5, 0.1  # a step that leaves more than this of the residual is far from equilibrium, less is near
     INEXACT = 0.02  # relative residual of a step by conjugate gradients
     MOST = (5, 12)  # their iterations, in two and in three dimensions
     WORTH = (10, 24)  # iterations that take as long as a factorisation, on a body of 50,000 elements
@@ -74,7 +75,7 @@ class Newton:
         force = momentum.force(u)
         energy = momentum.energy
         lowest = min(self.LEAST_J, momentum.least_J)
-        last, modified = np.inf, False
+        last, length, modified, far = np.inf, 1.0, False, False
         for _ in range(most):
             r = force.ravel()[self.free]
             error = float(np.linalg.norm(r[live]) / (np.linalg.norm(force) + self._least_force))
@@ -82,6 +83,9 @@ class Newton:
                 return u, force
             self.steps += 1
             self._slow = self._slow or (modified and error > self.KEEP * last)
+            far = length < 1.0 or error > (self.NEAR if far else self.FAR) * last
+            if far:
+                self._kept = None
             last = error
             modified = self._kept is not None and not self._slow
             step, fresh = np.zeros(u.shape), False
@@ -100,7 +104,6 @@ class Newton:
                 if not modified:
                     self._kept = None
                 modified = False
-            self._slow = self._slow or (length < 1.0 and modified)
             u += length * step
             energy = momentum.energy
         raise ConvergenceError(f"no equilibrium within {most} Newton steps")

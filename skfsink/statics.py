@@ -31,6 +31,8 @@ class StaticsControls:
     ----------
     tolerance: residual force at which equilibrium is reached, relative to the forces inside, in (0, 0.01].
     gamma_tolerance: change of gamma in a pass at which the coupled fields are converged, in (0, 0.01].
+    front: a sweep fails the points whose stored energy is at least this share of the greatest one, in [0, 1]; 0 fails
+        all that are past the energy limiter at once.
     increment: first (and largest) load increment, as displacement of a grip over the size of the body, in (0, 0.5].
     onset_tolerance: width of the last bisection interval of the onset, relative to the load, in (0, 0.1].
     max_newton: Newton steps after which an equilibrium is given up, >= 3.
@@ -40,6 +42,7 @@ class StaticsControls:
     tolerance: float = 1e-7
     gamma_tolerance: float = 1e-5
     increment: float = 0.01
+    front: float = 0.8
     onset_tolerance: float = 5e-4
     max_newton: int = 40
     max_passes: int = 80
@@ -47,6 +50,7 @@ class StaticsControls:
     def __post_init__(self) -> None:
         require("static-tolerance", self.tolerance, low=0, high=0.01, low_open=True)
         require("gamma-tolerance", self.gamma_tolerance, low=0, high=0.01, low_open=True)
+        require("front", self.front, low=0, high=1)
         require("increment", self.increment, low=0, high=0.5, low_open=True)
         require("onset-tolerance", self.onset_tolerance, low=0, high=0.1, low_open=True)
         require("max-newton", self.max_newton, low=3, whole=True)
@@ -103,7 +107,7 @@ class Statics:
         last, growing = np.inf, 0
         for _ in range(c.max_passes):
             try:
-                u, force = self.newton.equilibrium(u, max(c.tolerance, min(1e-4, 0.01 * last)))
+                u, force = self.newton.equilibrium(u, max(c.tolerance, min(1e-5, 1e-3 * last)))
             except ConvergenceError:
                 return None
             W = self.momentum.W
@@ -193,7 +197,7 @@ class Statics:
                 state.u, _ = self.newton.equilibrium(state.u, most=self.SNAP)
                 ledger.released += before - self.momentum.energy
             W = self.momentum.W
-            state.W_max = np.maximum(state.W_max, W)
+            postponed = self._follow(state, W)
             gamma = self.density.solve(state.W_max, state.gamma)
             change = float(np.abs(gamma - state.gamma).max())
             old = self.momentum.gamma
@@ -206,8 +210,20 @@ class Statics:
             ledger.drop(self.space.w, W, old, undeleted)
             ledger.deletion += float(np.einsum("eq,eq,eq->", self.space.w, W, undeleted - self.momentum.gamma))
             ledger.elastic = float(np.einsum("eq,eq,eq->", self.space.w, W, self.momentum.gamma))
-            self.settled = change <= self.controls.gamma_tolerance
+            self.settled = change <= self.controls.gamma_tolerance and not postponed
             yield state
+
+    def _follow(self, state: State, W: np.ndarray) -> bool:
+        """Let the history follow `W` (ne, nq) where failure is nearest; True if points that fail had to wait.
+
+        Points past the energy limiter wait while another one is much further past it: once that has failed and forces
+        have found their new ways, most of them are relieved.
+        """
+        phi = self.density.law.phi
+        most = float(W[self.momentum.gamma > 0].max(initial=0.0))
+        waiting = (W > phi) & (W < self.controls.front * most) & (W > state.W_max)
+        state.W_max = np.where(waiting, state.W_max, np.maximum(state.W_max, W))
+        return bool(waiting.any())
 
     def _advance(self, state: State, increment: float) -> None:
         """Move the grips on by a load time `increment` at fixed gamma, to the new equilibrium."""
