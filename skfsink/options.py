@@ -14,6 +14,7 @@ from .explicit import ExplicitControls
 from .hht import HHTControls
 from .material import AAA, SinkLaw
 from .scene import Controls
+from .statics import StaticsControls
 
 __all__ = ["SAMPLE", "Options"]
 
@@ -74,6 +75,8 @@ class Options:
         "dynamic", "quasistatic" or "both".
     integrator
         Of the dynamic event: "explicit" or "hht".
+    front
+        Quasi-static: a sweep fails the points whose stored energy is at least this share of the greatest one, in [0, 1].
     element
         "jbar" (element-constant J̄) or "plain" (standard Q1, locks).
     event_time
@@ -130,6 +133,7 @@ class Options:
     overshoot: Annotated[float, LOADING] = 0.005
     analysis: Annotated[str, ANALYSIS] = "dynamic"
     integrator: Annotated[str, ANALYSIS] = "explicit"
+    front: Annotated[float, ANALYSIS] = 0.8
     element: Annotated[str, ANALYSIS] = "jbar"
     event_time: Annotated[float, ANALYSIS] = 2e-4
     aftermath: Annotated[float, ANALYSIS] = 1e-5
@@ -171,7 +175,8 @@ class Options:
             self.checkpoint_every,
             self.threads, ExplicitControls(self.courant, self.gamma_every, self.mass_floor),
             HHTControls(self.hht_alpha, self.hht_dt, coupling=self.coupling, mass=self.mass,
-                        mass_floor=self.mass_floor))
+                        mass_floor=self.mass_floor),
+            StaticsControls(front=self.front))
 
     def parameters(self) -> dict[str, Any]:
         """The options that decide results, by name."""

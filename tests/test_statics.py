@@ -221,3 +221,23 @@ def test_controls_out_of_range_are_refused(name: str, value: float):
     """Fails if an option without meaning is accepted."""
     with pytest.raises(ParameterError, match=f"got {value}"):
         StaticsControls(**{name: value})
+
+
+def test_points_wait_while_one_is_much_further_past_the_limit(fracture: Fracture) -> None:
+    """Fails if a sweep kills all that is past Phi at once, forgets who waits, or lets a spent point hold up the rest."""
+    momentum, density = fracture.momentum, fracture.density
+    state = fracture.fresh()
+    momentum.set_gamma(state.gamma, state.deleted)
+    statics = Statics(momentum, density, fracture.free, fracture.velocity)
+    phi, before = density.law.phi, state.W_max.copy()
+    W = 0.5 * before
+    W[0], W[1], W[2], W[3] = 3.0 * phi, 2.5 * phi, 1.5 * phi, 0.9 * phi
+    assert statics._follow(state, W)
+    followed = [0, 1, 3]
+    assert np.array_equal(state.W_max[followed], np.maximum(before, W)[followed])
+    assert np.array_equal(state.W_max[2], before[2])          # waits
+    W[0] = W[1] = 0.1 * phi                                   # relieved
+    assert not statics._follow(state, W) and (state.W_max[2] == W[2]).all()
+    W[4], W[5] = 100 * phi, 1.2 * phi
+    momentum.gamma = np.where(np.arange(len(W))[:, None] == 4, 0.0, momentum.gamma)
+    assert not statics._follow(state, W) and (state.W_max[5] == W[5]).all()
