@@ -238,6 +238,6 @@ def test_points_wait_while_one_is_much_further_past_the_limit(fracture: Fracture
     assert np.array_equal(state.W_max[2], before[2])          # waits
     W[0] = W[1] = 0.1 * phi                                   # relieved
     assert not statics._follow(state, W) and (state.W_max[2] == W[2]).all()
-    W[4], W[5] = 100 * phi, 1.2 * phi
+    W[4], W[5] = 100 * phi, 1.4 * phi
     momentum.gamma = np.where(np.arange(len(W))[:, None] == 4, 0.0, momentum.gamma)
     assert not statics._follow(state, W) and (state.W_max[5] == W[5]).all()
