@@ -2,7 +2,7 @@
 
     P = a F + b cof F,   a = 2 w gamma psi' J^(-2/3),   b = w p - a (F:F)/(3 J).
 
-Reference gradients along direction d are the differences over the four edges in that direction, interpolated to the
+Reference gradients along a direction are the differences over the four edges in that direction, interpolated to the
 four lines of Gauss points; the nodal force is the transpose of that.
 """
 
@@ -15,42 +15,64 @@ from .force2d import _SIGNATURE, _add, _dilatation_plain, least_live
 from .lanes import FAST, GAUSS_HIGH, GAUSS_LOW, J_FLOOR, guess_inverse_cbrt, refine_inverse_cbrt
 from .lanes import LANES_3D as LANES
 
-# edges in direction d: first nodes; the second node is 2^d further. Edge m is at (m & 1, m >> 1) across.
-_EDGES = np.array([[0, 2, 4, 6], [0, 1, 4, 5], [0, 1, 2, 3]])
-# line of Gauss points in direction d on which Gauss point q lies
-_LINE = np.array([[(q >> 1) & 1 | (q >> 2 & 1) << 1 for q in range(8)],
-                  [q & 1 | (q >> 2 & 1) << 1 for q in range(8)],
-                  [q & 1 | (q >> 1 & 1) << 1 for q in range(8)]])
-_C = np.array([[GAUSS_HIGH, GAUSS_LOW], [GAUSS_LOW, GAUSS_HIGH]])
-_INTERPOLATE = np.kron(_C, _C)
-
 
 @njit(fastmath=FAST)
 def _gather(conn, x, z):  # type: ignore[no-untyped-def]
+    """Positions of the nodes by component, then node: z (24 L)."""
     for a in range(8):
         for i in range(LANES):
             node = conn[a, i]
-            z[3 * a, i] = x[node, 0]
-            z[3 * a + 1, i] = x[node, 1]
-            z[3 * a + 2, i] = x[node, 2]
+            z[a * LANES + i] = x[node, 0]
+            z[(8 + a) * LANES + i] = x[node, 1]
+            z[(16 + a) * LANES + i] = x[node, 2]
 
 
 @njit(fastmath=FAST)
-def _difference(a, b, out):  # type: ignore[no-untyped-def]
-    for i in range(LANES):
-        out[i] = b[i] - a[i]
+def _to_lines(e0, e1, e2, e3):  # type: ignore[no-untyped-def]
+    """Values on the four lines of Gauss points, from those on the four edges; its own transpose."""
+    a0, a1 = GAUSS_HIGH * e0 + GAUSS_LOW * e1, GAUSS_LOW * e0 + GAUSS_HIGH * e1
+    b0, b1 = GAUSS_HIGH * e2 + GAUSS_LOW * e3, GAUSS_LOW * e2 + GAUSS_HIGH * e3
+    return (GAUSS_HIGH * a0 + GAUSS_LOW * b0, GAUSS_HIGH * a1 + GAUSS_LOW * b1,
+            GAUSS_LOW * a0 + GAUSS_HIGH * b0, GAUSS_LOW * a1 + GAUSS_HIGH * b1)
 
 
 @njit(fastmath=FAST)
-def _mix(c0, c1, c2, c3, a, b, c, d, out):  # type: ignore[no-untyped-def]
-    for i in range(LANES):
-        out[i] = c0 * a[i] + c1 * b[i] + c2 * c[i] + c3 * d[i]
+def _gradient(z, g):  # type: ignore[no-untyped-def]
+    """One component's reference gradient, by direction and Gauss point, g (24 L), from its nodal values, z (8 L)."""
+    L = LANES
+    for i in range(L):
+        x0, x1, x2, x3 = z[i], z[L + i], z[2 * L + i], z[3 * L + i]
+        x4, x5, x6, x7 = z[4 * L + i], z[5 * L + i], z[6 * L + i], z[7 * L + i]
+        a, b, c, d = _to_lines(x1 - x0, x3 - x2, x5 - x4, x7 - x6)
+        g[i], g[L + i], g[2 * L + i], g[3 * L + i] = a, a, b, b
+        g[4 * L + i], g[5 * L + i], g[6 * L + i], g[7 * L + i] = c, c, d, d
+        a, b, c, d = _to_lines(x2 - x0, x3 - x1, x6 - x4, x7 - x5)
+        g[8 * L + i], g[9 * L + i], g[10 * L + i], g[11 * L + i] = a, b, a, b
+        g[12 * L + i], g[13 * L + i], g[14 * L + i], g[15 * L + i] = c, d, c, d
+        a, b, c, d = _to_lines(x4 - x0, x5 - x1, x6 - x2, x7 - x3)
+        g[16 * L + i], g[17 * L + i], g[18 * L + i], g[19 * L + i] = a, b, c, d
+        g[20 * L + i], g[21 * L + i], g[22 * L + i], g[23 * L + i] = a, b, c, d
 
 
 @njit(fastmath=FAST)
-def _copy(a, out):  # type: ignore[no-untyped-def]
-    for i in range(LANES):
-        out[i] = a[i]
+def _nodal_force(t, out):  # type: ignore[no-untyped-def]
+    """Transpose of :func:`_gradient`: component c of the nodal forces, rows 3 a + c of `out` beginning at its row c."""
+    L = LANES
+    for i in range(L):
+        x0, x1, x2, x3 = _to_lines(t[i] + t[L + i], t[2 * L + i] + t[3 * L + i],
+                                   t[4 * L + i] + t[5 * L + i], t[6 * L + i] + t[7 * L + i])
+        y0, y1, y2, y3 = _to_lines(t[8 * L + i] + t[10 * L + i], t[9 * L + i] + t[11 * L + i],
+                                   t[12 * L + i] + t[14 * L + i], t[13 * L + i] + t[15 * L + i])
+        z0, z1, z2, z3 = _to_lines(t[16 * L + i] + t[20 * L + i], t[17 * L + i] + t[21 * L + i],
+                                   t[18 * L + i] + t[22 * L + i], t[19 * L + i] + t[23 * L + i])
+        out[i] = -x0 - y0 - z0
+        out[3 * L + i] = x0 - y1 - z1
+        out[6 * L + i] = -x1 + y0 - z2
+        out[9 * L + i] = x1 + y1 - z3
+        out[12 * L + i] = -x2 - y2 + z0
+        out[15 * L + i] = x2 - y3 + z1
+        out[18 * L + i] = -x3 + y2 + z2
+        out[21 * L + i] = x3 + y3 + z3
 
 
 @njit(fastmath=FAST)
@@ -164,42 +186,22 @@ def _energy(w, gamma, W, psi):  # type: ignore[no-untyped-def]
             psi[i] += w[q * LANES + i] * gamma[q * LANES + i] * W[q * LANES + i]
 
 
-@njit(fastmath=FAST)
-def _add_to(a, out):  # type: ignore[no-untyped-def]
-    for i in range(a.size):
-        out[i] += a[i]
-
-
-@njit(fastmath=FAST)
-def _subtract_from(a, out):  # type: ignore[no-untyped-def]
-    for i in range(a.size):
-        out[i] -= a[i]
-
-
 @njit(_SIGNATURE, cache=True, fastmath=FAST, nogil=True)
 def force_3d(law, constants, k_bulk, conn, x, geometry, gamma, j_bar, force, W, psi):  # type: ignore[no-untyped-def]
     L, Q = LANES, 8 * LANES
-    z, edge, line = np.empty((24, L)), np.empty((4, L)), np.empty((4, L))
-    g, F, P, t = np.empty((3, 3, 8, L)), np.empty(9 * Q), np.empty(9 * Q), np.empty((3, 3, 8, L))
+    z, g, t = np.empty(24 * L), np.empty(3 * Q), np.empty(3 * Q)
+    F, P = np.empty(9 * Q), np.empty(9 * Q)
     J, floored, tr, R, I1 = np.empty(Q), np.empty(Q), np.empty(Q), np.empty(Q), np.empty(Q)
     psi_q, dpsi, ddpsi, ab, mean = np.empty(Q), np.empty(Q), np.empty(Q), np.empty(2 * Q), np.empty(3 * L)
     pressure, volumetric = np.empty(Q), np.empty(Q)
     least = 1.0
-    M = _INTERPOLATE
     for tile in range(conn.shape[0]):
         geo, gam = geometry[tile].reshape(-1), gamma[tile].reshape(-1)
         w = geo[9 * Q:]
         _gather(conn[tile], x, z)
         for c in range(3):
-            for d in range(3):
-                for m in range(4):
-                    n0 = _EDGES[d, m]
-                    _difference(z[3 * n0 + c], z[3 * (n0 + (1 << d)) + c], edge[m])
-                for f in range(4):
-                    _mix(M[f, 0], M[f, 1], M[f, 2], M[f, 3], edge[0], edge[1], edge[2], edge[3], line[f])
-                for q in range(8):
-                    _copy(line[_LINE[d, q]], g[c, d, q])
-            _push(g[c].reshape(-1), geo, F[3 * c * Q:3 * (c + 1) * Q])
+            _gradient(z[8 * c * L:8 * (c + 1) * L], g)
+            _push(g, geo, F[3 * c * Q:3 * (c + 1) * Q])
         _invariants(F, J, floored, tr)
         least = least_live(J, gam, least)
         guess_inverse_cbrt(floored.view(np.int64), R.view(np.int64))
@@ -214,21 +216,10 @@ def force_3d(law, constants, k_bulk, conn, x, geometry, gamma, j_bar, force, W, 
         _coefficients(w, gam, dpsi, R, pressure, ab)
         _deviator(ab, tr, floored)
         _piola(F, ab, P)
+        density, out = W[tile].reshape(-1), force[tile].reshape(-1)
         for c in range(3):
-            _pull(P[3 * c * Q:3 * (c + 1) * Q], geo, t[c].reshape(-1))
-        density = W[tile].reshape(-1)
+            _pull(P[3 * c * Q:3 * (c + 1) * Q], geo, t)
+            _nodal_force(t, out[c * L:])
         _add(psi_q, volumetric, density)
         _energy(w, gam, density, psi[tile])
-        out = force[tile]
-        out[:] = 0.0
-        for c in range(3):
-            for d in range(3):
-                line[:] = 0.0
-                for q in range(8):
-                    _add_to(t[c, d, q], line[_LINE[d, q]])
-                for m in range(4):
-                    n0 = _EDGES[d, m]
-                    _mix(M[0, m], M[1, m], M[2, m], M[3, m], line[0], line[1], line[2], line[3], edge[m])
-                    _add_to(edge[m], out[3 * (n0 + (1 << d)) + c])
-                    _subtract_from(edge[m], out[3 * n0 + c])
     return least
