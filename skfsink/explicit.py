@@ -237,9 +237,8 @@ class Explicit:
 
         It is the Rayleigh quotient of M^-1 b, so a lower bound of omega_max^2, and follows it closely.
         """
-        g = self.momentum.space.element_mean(self.momentum.gamma)
-        return float(_volumetric_ratio(self.space.conn, self.space.X + u, self.space.dN, self.space.w, g, self.mass,
-                                       self._free) * self.momentum.material.bulk_modulus)
+        inverse_mass = self._free / self.mass[:, None]
+        return self.momentum.tiles.volumetric(self.space.X + u, inverse_mass) * self.momentum.material.bulk_modulus
 
     # --- checkpoints ---
     def memory(self) -> dict[str, np.ndarray]:
@@ -292,42 +291,3 @@ def _kick(v, a, free, mass, old, force, du, dt):  # type: ignore[no-untyped-def]
                 held += step_work
             kinetic += 0.5 * mass[n] * v[n, i] ** 2
     return work, held, kinetic, swing
-
-
-@njit(cache=True)
-def _volumetric_ratio(conn, x, dN, w, gamma_bar, mass, free):  # type: ignore[no-untyped-def]
-    ne, nq, na, dim = dN.shape
-    b = np.empty((na, dim))
-    F = np.empty((dim, dim))
-    greatest = 0.0
-    for e in range(ne):
-        if gamma_bar[e] == 0.0:
-            continue
-        b[:] = 0.0
-        V = 0.0
-        for q in range(nq):
-            V += w[e, q]
-            for i in range(dim):
-                for j in range(dim):
-                    s = 0.0
-                    for a in range(na):
-                        s += x[conn[e, a], i] * dN[e, q, a, j]
-                    F[i, j] = s
-            for a in range(na):
-                for i in range(dim):
-                    s = 0.0
-                    for j in range(dim):
-                        if dim == 2:
-                            cof = F[1 - i, 1 - j] if i == j else -F[1 - i, 1 - j]
-                        else:
-                            i1, i2, j1, j2 = (i + 1) % 3, (i + 2) % 3, (j + 1) % 3, (j + 2) % 3
-                            cof = F[i1, j1] * F[i2, j2] - F[i1, j2] * F[i2, j1]
-                        s += cof * dN[e, q, a, j]
-                    b[a, i] += w[e, q] * s
-        total = 0.0
-        for a in range(na):
-            for i in range(dim):
-                if free[conn[e, a], i]:
-                    total += b[a, i] ** 2 / mass[conn[e, a]]
-        greatest = max(greatest, gamma_bar[e] * total / V)
-    return greatest

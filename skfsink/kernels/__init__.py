@@ -1,6 +1,7 @@
 """Compiled element loops: the weak forms of :mod:`skfsink.forms`, equal to them to rounding and used by every run.
 
 force2d, force3d   internal force, stored energy and its density; explicit steps spend their time here
+volumetric         the indicator of the highest frequency, from passes of these two
 tiles              the memory layout those two work on
 tangent            tangent stiffness with material, geometric and J_bar coupling
 scalar             mass, Laplacian and sink matrices

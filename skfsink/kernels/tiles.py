@@ -20,6 +20,7 @@ from ..space import Space
 from .force2d import force_2d
 from .force3d import force_3d
 from .lanes import LANES, LANES_3D
+from .volumetric import volumetric_2d, volumetric_3d
 
 __all__ = ["Tiles"]
 
@@ -82,6 +83,13 @@ class Tiles:
         _sum_at_nodes(self._force.reshape(-1), self._start, self._offset, self.lanes, out)
         return float(least)
 
+    def volumetric(self, x: np.ndarray, inverse_mass: np.ndarray) -> float:
+        """Greatest gamma_bar V |b|^2_(1/m) of an element, b = dJ_bar/du, at `x`; times k a frequency squared [1/s^2].
+
+        `inverse_mass` (n, dim) is zero where a degree of freedom is held.
+        """
+        loop = volumetric_2d if self.space.dim == 2 else volumetric_3d
+        return float(loop(self.conn, x, self.geometry, self.gamma, inverse_mass))
 
     def mean_force(self) -> float:
         """Mean magnitude of the forces the elements exert on their nodes, by component, at the last evaluation.
