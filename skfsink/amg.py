@@ -26,7 +26,8 @@ class AmgCG:
     """
 
     DEAD = 3.0           # of the intact diagonal
-    OMEGA = 0.8          # Jacobi weight of the smoother
+    OMEGA = 0.8          # greatest Jacobi weight of the smoother
+    STABLE = 1.6         # that weight times the spectral radius of D^-1 A at the most; past 2 it would not smooth
     DIRECT_COARSE = 6000  # unknowns of the second level that are factorised rather than coarsened on
 
     def __init__(self, intact: csr_array, tolerance: float = 1e-8, max_iterations: int = 100) -> None:
@@ -35,6 +36,7 @@ class AmgCG:
         self.iterations = 0          #: of the last solve
         self.residual = 0.0          #: true relative residual of the last solve
         self._diagonal0 = intact.diagonal()
+        self.omega = min(self.OMEGA, self.STABLE / self._radius(intact))  #: Jacobi weight
         state = np.random.get_state()
         np.random.seed(0)  # pyamg estimates spectral radii from random vectors
         try:
@@ -59,6 +61,15 @@ class AmgCG:
                     np.random.set_state(state)
                 self._coarse = cycle.matvec
 
+    def _radius(self, intact: csr_array) -> float:
+        """Spectral radius of D^-1 A of the intact matrix; sinks only lower it."""
+        if intact.shape[0] < 3:
+            return 2.0
+        scale = 1.0 / np.sqrt(self._diagonal0)
+        start = np.sin(1.0 + np.arange(scale.size) * 2.399963)  # the same every time, without any symmetry
+        operator = sla.LinearOperator(intact.shape, dtype=float, matvec=lambda x: scale * (intact @ (scale * x.ravel())))
+        return float(sla.eigsh(operator, k=1, which="LA", v0=start, tol=1e-2, return_eigenvectors=False)[0])
+
     def solve(self, A: csr_array, D: np.ndarray, b: np.ndarray, x: np.ndarray,
               reduction: float = 0.0) -> np.ndarray | None:
         """Solution of A x = b from the guess `x`; None if it did not converge in `max_iterations`.
@@ -66,7 +77,7 @@ class AmgCG:
         `D` is the diagonal of A. With `reduction` the solve may stop when the residual is that fraction of the one of
         the guess, or 1e-6, whichever is less: what is left then is that fraction of what the solve had to change.
         """
-        smoother = self.OMEGA / D
+        smoother = self.omega / D
         live = (self.DEAD * self._diagonal0 > D).astype(float)
         indptr, indices, data = unsigned(A)
         size = float(np.linalg.norm(b))

@@ -22,7 +22,7 @@ ASSUMED = (
 
 
 def simple_shear(*, side: Annotated[float, SAMPLE] = 4.0, notch: Annotated[float, SAMPLE] = 2.0,
-                 notch_width: Annotated[float, SAMPLE] = 0.1, top: Annotated[str, SAMPLE] = "free",
+                 notch_width: Annotated[float, SAMPLE] = 0.1, top: Annotated[str, SAMPLE] = "held",
                  mesh: Annotated[str, SAMPLE] = "M4", mesh_seed: Annotated[int, SAMPLE] = 0,
                  options: Options = Options()) -> Result:  # noqa: B008
     """Shear a square plate with a notch to its middle, slowly, and watch the crack.
@@ -39,7 +39,7 @@ def simple_shear(*, side: Annotated[float, SAMPLE] = 4.0, notch: Annotated[float
     notch_width
         Width of the notch [mm], in (0, side).
     top
-        "free" or "held": whether the top edge may move up and down.
+        "held" or "free": whether the top edge keeps its height, or may move up and down.
     mesh
         "coarse" (element size l/4 where the crack runs), "M4" (l/4, wider), "paper" (l/5.7 throughout), or the path
         of a mesh file.
