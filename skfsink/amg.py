@@ -67,7 +67,8 @@ class AmgCG:
             return 2.0
         scale = 1.0 / np.sqrt(self._diagonal0)
         start = np.sin(1.0 + np.arange(scale.size) * 2.399963)  # the same every time, without any symmetry
-        operator = sla.LinearOperator(intact.shape, dtype=float, matvec=lambda x: scale * (intact @ (scale * x.ravel())))
+        operator = sla.LinearOperator(intact.shape, dtype=float,
+                                      matvec=lambda x: scale * (intact @ (scale * x.ravel())))
         return float(sla.eigsh(operator, k=1, which="LA", v0=start, tol=1e-2, return_eigenvectors=False)[0])
 
     def solve(self, A: csr_array, D: np.ndarray, b: np.ndarray, x: np.ndarray,

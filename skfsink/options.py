@@ -76,7 +76,7 @@ class Options:
     integrator
         Of the dynamic event: "explicit" or "hht".
     front
-        Quasi-static: a sweep fails the points whose stored energy is at least this share of the greatest one, in [0, 1].
+        Quasi-static: a sweep fails the points with at least this share of the greatest stored energy, in [0, 1].
     element
         "jbar" (element-constant J̄) or "plain" (standard Q1, locks).
     event_time

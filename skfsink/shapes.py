@@ -62,7 +62,7 @@ def simple_shear_mesh(*, side: float = 4.0, notch: float = 2.0, notch_width: flo
     if symmetry == "none":
         return _edge_notched(side, notch, notch_width, size, seed)
     lower = [Edge("bottom", (side, 0)), Edge("right", (side, middle)), Edge("seam", (notch, middle)),
-             Edge("notch", (notch - r, middle - r), via=(notch - r * (1 - math.sqrt(0.5)), middle - r * math.sqrt(0.5))),
+             Edge("notch", (notch - r, middle - r), via=(notch - r + r * math.sqrt(0.5), middle - r * math.sqrt(0.5))),
              Edge("notch", (0, middle - r)), Edge("left", (0, 0))]
     half = mesh_outline(lower, size, seed=seed)
     return completed(half, "seam", lambda p: p * (1, -1) + (0, side), {"bottom": "top"})

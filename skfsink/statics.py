@@ -221,7 +221,7 @@ class Statics:
         """
         phi = self.density.law.phi
         most = float(W[self.momentum.gamma > 0].max(initial=0.0))
-        waiting = (W > phi) & (W < self.controls.front * most) & (W > state.W_max)
+        waiting = (phi < W) & (self.controls.front * most > W) & (state.W_max < W)
         state.W_max = np.where(waiting, state.W_max, np.maximum(state.W_max, W))
         return bool(waiting.any())
 

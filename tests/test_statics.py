@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from bodies import box, ends, grips, notched, wavy
+from bodies import Fracture, box, ends, grips, notched, wavy
 
 from skfsink.density import DensitySolver
 from skfsink.energy import Ledger
@@ -224,7 +224,7 @@ def test_controls_out_of_range_are_refused(name: str, value: float):
 
 
 def test_points_wait_while_one_is_much_further_past_the_limit(fracture: Fracture) -> None:
-    """Fails if a sweep kills all that is past Phi at once, forgets who waits, or lets a spent point hold up the rest."""
+    """Fails if a sweep kills all past Phi at once, forgets who waits, or lets a spent point hold up the rest."""
     momentum, density = fracture.momentum, fracture.density
     state = fracture.fresh()
     momentum.set_gamma(state.gamma, state.deleted)

@@ -16,8 +16,9 @@ __all__ = ["asymmetric_double_edge_notch"]
 
 ASSUMED = (
     "side 4 mm: the paper prints no length; 28,531 elements of size l/5 in the fine part fit it",
-    "notches 1 mm long: not printed",
-    "offset 0.6 mm between the heights of the notches, half of it on each side of mid-height: not printed",
+    "notches 0.6 mm long: not printed; the cracks then branch and bridge as the paper describes",
+    "offset 1 mm between the heights of the notches, half of it on each side of mid-height: not printed",
+    "the mesh of one half is that of the other turned by half a turn, so that both notches have the same elements",
     "notches 0.1 mm = l wide with round tips: not printed",
 )
 

@@ -19,6 +19,7 @@ ASSUMED = (
     "length 10 mm: the paper prints the thickness only",
     "gauge 4 mm long and 1.5 mm wide, ends 3 mm wide, fillets of 0.75 mm tangent to the gauge: not printed",
     "element size l/5 in gauge and fillets, l/3.8 in the ends, two layers: chosen to meet 82,382 elements",
+    "the four quarters of the mesh are mirror images of each other",
 )
 
 

@@ -18,6 +18,7 @@ ASSUMED = (
     "notch 2 mm long, to the middle, at mid-height: not printed",
     "notch 0.1 mm = l wide with a round tip: not printed",
     "the top edge stays at its height: the paper prescribes its motion in x and does not mention y",
+    "the mesh of the upper half is the mirror image of the lower one",
 )
 
 

@@ -14,11 +14,12 @@ from ..shapes import check_two_notches
 __all__ = ["symmetric_double_edge_notch"]
 
 ASSUMED = (
-    "side 2.5 mm: the paper prints no length; the dissipated energies fit a ligament of 1 to 1.8 mm",
-    "notches 0.625 mm long at mid-height: not printed",
+    "side 3 mm: the paper prints no length; with notches of 0.5 mm, U is then near its 0.0295 N mm/mm",
+    "notches 0.5 mm long at mid-height: not printed",
     "notches 0.1 mm = l wide with round tips: not printed",
     "the grips hold the plate sideways: not printed",
     "element size l/5 on the mesh `paper`: not printed",
+    "the mesh of one half is that of the other turned by half a turn, so that both notches have the same elements",
 )
 
 
@@ -40,7 +41,8 @@ def symmetric_double_edge_notch(*, side: Annotated[float, SAMPLE] = 3.0, notch: 
     notch_width
         Width of the notches [mm], in (0, side).
     mesh
-        "coarse", "M4", "paper" (element size l/1.5, l/4, l/5), or the path of a mesh file.
+        "coarse", "mirror" (mirror-symmetric), "M4", "paper" (element size l/1.5, l/1.5, l/4, l/5), or the path of a
+        mesh file.
     mesh_seed
         Another mesh of the same sizes for each number; other than 0 it needs gmsh (the mesh extra).
     options
