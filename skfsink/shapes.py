@@ -233,7 +233,7 @@ SHAPES: dict[str, Shape] = {
         "coarse": {"h": 0.025, "half_width": 0.25}, "M4": {"h": 0.025, "half_width": 1.0},
         "paper": {"h": 0.01765, "half_width": 4.0}}),
     "symmetric_double_edge_notch": Shape(symmetric_double_edge_notch_mesh, {
-        "coarse": {"h": 0.1 / 1.5}, "mirror": {"h": 0.064, "symmetry": "mirror"}, "M4": {"h": 0.025},
+        "coarse": {"h": 0.1 / 3}, "mirror": {"h": 0.064, "symmetry": "mirror"}, "M4": {"h": 0.025},
         "paper": {"h": 0.02}}),
     "asymmetric_double_edge_notch": Shape(asymmetric_double_edge_notch_mesh, {
         "coarse": {"h": 0.1 / 1.5}, "M3": {"h": 0.1 / 3}, "paper": {"h": 0.02}}),

@@ -41,7 +41,7 @@ def symmetric_double_edge_notch(*, side: Annotated[float, SAMPLE] = 3.0, notch: 
     notch_width
         Width of the notches [mm], in (0, side).
     mesh
-        "coarse", "mirror" (mirror-symmetric), "M4", "paper" (element size l/1.5, l/1.5, l/4, l/5), or the path of a
+        "coarse", "mirror" (mirror-symmetric), "M4", "paper" (element size l/3, l/1.5, l/4, l/5), or the path of a
         mesh file.
     mesh_seed
         Another mesh of the same sizes for each number; other than 0 it needs gmsh (the mesh extra).
