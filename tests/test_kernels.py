@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import skfem
-from bodies import boundary, box, distorted, grid, patchy, wavy
+from bodies import boundary, box, distorted, ends, grid, patchy, wavy
 from scipy.spatial.transform import Rotation
 
 from skfsink import kernels
@@ -34,6 +34,19 @@ def close(got: np.ndarray, expected: np.ndarray, tolerance: float = ROUNDING) ->
     assert got.shape == expected.shape
     error = abs(got - expected).max() / abs(expected).max()
     assert error <= tolerance, f"relative difference {error:.2e}"
+
+
+def test_volumetric_indicator_is_the_rayleigh_quotient_of_one_element(space: Space):
+    """Fails if the compiled indicator is not gamma_bar V sum |b_a|^2/m_a of some element, b from the deformation."""
+    u, gamma = wavy(space, 0.15), patchy(space)
+    momentum = momentum_of(space, gamma)
+    F = space.deformation_gradient(u)
+    cofactor = np.linalg.det(F)[..., None, None] * np.swapaxes(np.linalg.inv(F), -1, -2)
+    cofactor = cofactor[..., :space.dim, :space.dim]
+    b = np.einsum("eq,eqiJ,eqaJ->eai", space.w, cofactor, space.dN) / space.V[:, None, None]
+    inverse_mass = np.random.default_rng(4).uniform(0, 2, space.X.shape)
+    ratio = space.element_mean(gamma) * space.V * np.einsum("eai,eai->e", b**2, inverse_mass[space.conn])
+    assert momentum.tiles.volumetric(space.X + u, inverse_mass) == pytest.approx(ratio.max(), rel=1e-12)
 
 
 # --- equal to the weak forms ---
@@ -195,6 +208,24 @@ def test_tangent_is_the_derivative_of_the_force(kind: str, element: str, materia
         slopes = [(momentum.force(u + h * d) - momentum.force(u - h * d)) / (2 * h) for h in (2e-4, 1e-4)]
         difference[:, i] = ((4 * slopes[1] - slopes[0]) / 3).ravel()
     close(difference, K, 1e-9)
+
+
+@both_elements
+def test_convex_tangent_is_that_of_the_potential_where_points_are_stable(space: Space, element: str):
+    """Fails if bounding the pressure changes the tangent of a body in tension, or leaves a crushed one indefinite."""
+    pattern = Pattern(space, space.dim, np.repeat(~ends(space)[0], space.dim), upper=True)
+    momentum = momentum_of(space, np.ones_like(space.w), element)
+    stretches = np.array([1.3, 1 / 1.3, 1.0] if space.dim == 2 else [1.3, 1.3**-0.5, 1.3**-0.5])
+    least = np.prod(np.sort(stretches[:space.dim])[:2]) if space.dim == 3 else 1.0
+    slope = float(momentum.material.isochoric(np.sum(stretches**2))[1])
+    pressure = slope * (2 / 3 * np.sum(stretches**2) - least)  # tension in every direction
+    swell = (1 + pressure / momentum.material.bulk_modulus) ** (1 / space.dim)
+    for u in (np.zeros_like(space.X), space.X * (stretches[:space.dim] * swell - 1)):
+        close(momentum.tangent(pattern, u, convex=True), momentum.tangent(pattern, u))
+    for size in (0.0, 0.1, 0.3):
+        u = space.X * np.array([0.0, -0.15, 0.0])[:space.dim] + wavy(space, size)
+        exact, convex = (pattern.symmetric(momentum.tangent(pattern, u, c)).toarray() for c in (False, True))
+        assert np.linalg.eigvalsh(exact)[0] < 0 < np.linalg.eigvalsh(convex)[0]
 
 
 @both_elements

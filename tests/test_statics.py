@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from bodies import Fracture, box, ends, grips, notched, wavy
+from bodies import Fracture, box, ends, grid, grips, notched, wavy
 
 from skfsink.density import DensitySolver
 from skfsink.energy import Ledger
@@ -241,3 +241,44 @@ def test_points_wait_while_one_is_much_further_past_the_limit(fracture: Fracture
     W[4], W[5] = 100 * phi, 1.4 * phi
     momentum.gamma = np.where(np.arange(len(W))[:, None] == 4, 0.0, momentum.gamma)
     assert not statics._follow(state, W) and (state.W_max[5] == W[5]).all()
+
+
+def test_bent_strip_snaps_back(kind: str):
+    """Fails if Newton's method loses its way where the tangent is indefinite: a strip bent to a U, one end let go."""
+    shape, size = ((20, 4), (1.0, 0.2)) if kind == "quad" else ((16, 2, 2), (1.0, 0.15, 0.15))
+    space = Space(grid(kind, shape, size))
+    momentum = Momentum(space, AAA())
+    free = np.repeat(~ends(space, axis=0)[0], space.dim)
+    statics = Statics(momentum, DensitySolver(space, LAW), free, np.zeros_like(space.X))
+    x, y = space.X[:, 0], space.X[:, 1] - size[1] / 2
+    angle, radius = np.pi * x, 1 / np.pi
+    bent = space.X.copy()
+    bent[:, 0], bent[:, 1] = (radius - y) * np.sin(angle), radius - (radius - y) * np.cos(angle) + size[1] / 2
+    u, _ = statics.newton.equilibrium(bent - space.X, most=200)
+    np.testing.assert_allclose(u, 0.0, atol=1e-5)
+    assert momentum.energy < 1e-10
+    assert statics.newton_steps <= 150 and statics.factorisations <= 180
+
+
+def test_sweeps_resume_to_the_same_bits():
+    """Fails if a checkpoint of the sweeps misses what the factors that are kept were made from."""
+    bodies = [loaded(), loaded()]
+    for body in bodies:
+        body.state.u *= 1.005
+        body.state.grip *= 1.005
+        body.state.step, body.state.ledger = 0, Ledger()
+    whole, parts = bodies
+    for state in whole.statics.propagate(whole.state):
+        if state.step == 9:
+            break
+    for stop in (2, 4, 5, 9):
+        for state in parts.statics.propagate(parts.state):
+            if state.step == stop:
+                break
+        other = Body.of(notched(9))
+        other.statics.restore(parts.statics.memory())
+        other.statics.density.restore(parts.statics.density.memory())
+        parts = Body(other.momentum, other.statics, parts.state)
+    np.testing.assert_array_equal(whole.state.u, parts.state.u)
+    np.testing.assert_array_equal(whole.state.gamma, parts.state.gamma)
+    assert whole.state.ledger == parts.state.ledger and whole.state.ledger.released > 0
