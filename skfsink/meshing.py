@@ -95,6 +95,7 @@ def mesh_outline(outline: Sequence[Edge], size: SizeField, *, seed: int = 0,
     a tiny element, which would spoil the time step. Meshes are therefore made, each with its own ripple and a
     rescaled field, until one has as many elements as squares of the asked sizes and no bad element.
     """
+    require("seed", seed, low=0)
     scale, best, least = TYPICAL_SCALE, None, math.inf
     with _gmsh_model() as gmsh:
         names = _add_outline(gmsh, outline)
