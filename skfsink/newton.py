@@ -37,7 +37,7 @@ class Newton:
 
     LIVE = 1e-3     # nodes with less than this of their mass are not asked for equilibrium
     KEEP = 0.2      # factors are used as they are while each step with them lowers the residual to this fraction
-    FAR, NEAR = 0.5, 0.1  # a step that leaves more than this of the residual is far from equilibrium, less is near
+    FAR = 0.5       # far from equilibrium: a step leaves more than this of the residual, or had to be shortened
     INEXACT = 0.02  # relative residual of a step by conjugate gradients
     MOST = (5, 12)  # their iterations, in two and in three dimensions
     WORTH = (10, 24)  # iterations that take as long as a factorisation, on a body of 50,000 elements
@@ -75,7 +75,7 @@ class Newton:
         force = momentum.force(u)
         energy = momentum.energy
         lowest = min(self.LEAST_J, momentum.least_J)
-        last, length, modified, far = np.inf, 1.0, False, False
+        last, length, modified = np.inf, 1.0, False
         for _ in range(most):
             r = force.ravel()[self.free]
             error = float(np.linalg.norm(r[live]) / (np.linalg.norm(force) + self._least_force))
@@ -83,8 +83,7 @@ class Newton:
                 return u, force
             self.steps += 1
             self._slow = self._slow or (modified and error > self.KEEP * last)
-            far = length < 1.0 or error > (self.NEAR if far else self.FAR) * last
-            if far:
+            if length < 1.0 or error > self.FAR * last:
                 self._kept = None
             last = error
             modified = self._kept is not None and not self._slow
