@@ -76,7 +76,7 @@ def _scene(own: dict[str, Any], options: Options) -> Scene:
                             lambda section: swept(section, thickness, own["layers"], rolled(radius, thickness))),
         material=options.material(), sink_law=options.sink_law(),
         grips=(Grip("top", (0.0, 0.0, speed)), Grip("bottom", (0.0, 0.0, -speed))), faces=("back", "front"),
-        view=(55.0, 20.0),
+        view=(80.0, 25.0),
         controls=options.controls(), assumed=ASSUMED)
 
 
