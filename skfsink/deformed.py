@@ -117,8 +117,9 @@ def speed(frame: Frame) -> np.ndarray:
 
 
 def fastest(frames: Sequence[Frame]) -> float:
-    """A round speed [m/s] that all but the fastest few of the nodes that hold stay below."""
-    top = float(np.quantile(np.concatenate([speed(frame)[frame.gamma >= CRACKED] for frame in frames]), 0.999))
+    """A round speed [m/s] that all but the fastest few of the nodes that hold stay below; frames may lack it."""
+    speeds = [speed(frame)[frame.gamma >= CRACKED] for frame in frames if frame.v is not None]
+    top = float(np.quantile(np.concatenate(speeds), 0.999))
     unit = 10.0 ** np.floor(np.log10(max(top, 1e-9)))
     return float(unit * next(step for step in (1, 1.5, 2, 3, 4, 5, 6, 8, 10) if step * unit >= top))
 
