@@ -230,7 +230,7 @@ SHAPES: dict[str, Shape] = {
     "single_edge_notch": Shape(single_edge_notch_mesh, {
         "coarse": {"h": 0.1 / 1.5}, "M3": {"h": 0.0331}, "M4": {"h": 0.02505}, "M5": {"h": 0.0202}}),
     "simple_shear": Shape(simple_shear_mesh, {
-        "coarse": {"h": 0.025, "half_width": 0.25}, "M4": {"h": 0.025, "half_width": 1.0},
+        "coarse": {"h": 0.025, "half_width": 0.4}, "M4": {"h": 0.025, "half_width": 1.0},
         "paper": {"h": 0.01765, "half_width": 4.0}}),
     "symmetric_double_edge_notch": Shape(symmetric_double_edge_notch_mesh, {
         "coarse": {"h": 0.1 / 3}, "mirror": {"h": 0.064, "symmetry": "mirror"}, "M4": {"h": 0.025},
