@@ -16,7 +16,6 @@ for _name in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
 import json
-import platform
 import statistics
 import subprocess
 import sys
@@ -35,10 +34,10 @@ from skfsink.explicit import Explicit
 from skfsink.forms import momentum_forms
 from skfsink.material import AAA, SinkLaw
 from skfsink.momentum import Momentum
-from skfsink.output import versions
 from skfsink.sample import Sample, load_sample
 from skfsink.space import Pattern, Space
 from skfsink.state import State
+from skfsink.study.machine import machine
 
 HERE = Path(__file__).resolve().parent
 
@@ -169,16 +168,6 @@ def memory_M5() -> dict[str, Any]:
 
 
 ALL = {f.__name__: f for f in (tangent, step, gamma, run_M3, event_M4, memory_M5)}
-
-
-def machine() -> dict[str, Any]:
-    """What the figures were measured on."""
-    model = platform.processor()
-    info = Path("/proc/cpuinfo")
-    if info.exists():
-        model = next((line.split(":")[1].strip() for line in info.read_text().splitlines() if "model name" in line),
-                     model)
-    return {"processor": model, "cores": os.cpu_count(), "versions": versions()}
 
 
 def main(names: list[str]) -> None:

@@ -1,0 +1,1 @@
+"""Studies of the methods: speed against accuracy, stability, and how much model a scene needs."""
