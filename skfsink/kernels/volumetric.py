@@ -7,9 +7,6 @@ the passes of the force loops are used again.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 from numba import float64, njit, types
 
@@ -23,61 +20,60 @@ _SIGNATURE = float64(_c(types.uint32, 3, "C"), _c(float64, 2, "C"), _c(float64, 
                      _c(float64, 2, "C"))
 
 
-def _make(dim: int) -> Callable[..., Any]:
-    na, lanes = 2**dim, (LANES if dim == 2 else LANES_3D)
-    Q, rows = na * lanes, 2**dim * dim
-
-    @njit(fastmath=FAST)
-    def square(conn, b, inverse_mass, w, gamma, out):  # type: ignore[no-untyped-def]
-        """gamma_bar sum_a |V b_a|^2/m_a / V; b has the rows dim * a + component."""
-        for i in range(lanes):
-            total, V, mean = 0.0, 0.0, 0.0
-            for a in range(na):
-                node = conn[a, i]
-                for c in range(dim):
-                    total += b[(dim * a + c) * lanes + i] ** 2 * inverse_mass[node, c]
-                V += w[a * lanes + i]
-                mean += w[a * lanes + i] * gamma[a * lanes + i]
-            out[i] = mean * total / (V * V)
-
-    if dim == 2:
-        @njit(fastmath=FAST)
-        def gradient(conn, x, geo, z, ws, ab, t, b):  # type: ignore[no-untyped-def]
-            force2d._gather(conn, x, z)
-            force2d._kinematics(z, geo, ws)
-            force2d._stress(ws, geo, ab, t)
-            force2d._nodal_force(t, b)
-    else:
-        @njit(fastmath=FAST)
-        def gradient(conn, x, geo, z, ws, ab, t, b):  # type: ignore[no-untyped-def]
-            F, P = ws[:9 * Q], ws[9 * Q:18 * Q]
-            force3d._gather(conn, x, z)
-            for c in range(3):
-                force3d._gradient(z[8 * c * lanes:8 * (c + 1) * lanes], t)
-                force3d._push(t, geo, F[3 * c * Q:3 * (c + 1) * Q])
-            force3d._piola(F, ab, P)
-            for c in range(3):
-                force3d._pull(P[3 * c * Q:3 * (c + 1) * Q], geo, t)
-                force3d._nodal_force(t, b[c * lanes:])
-
-    @njit(_SIGNATURE, cache=True, fastmath=FAST, nogil=True)
-    def loop(conn, x, geometry, gamma, inverse_mass):  # type: ignore[no-untyped-def]
-        z, ws, t = np.empty(rows * lanes), np.empty(18 * Q), np.empty(4 * Q)
-        ab, b, out = np.zeros(2 * Q), np.empty(rows * lanes), np.empty(lanes)
-        greatest = 0.0
-        for tile in range(conn.shape[0]):
-            geo, gam = geometry[tile].reshape(-1), gamma[tile].reshape(-1)
-            w = geo[dim * dim * Q:]
-            ab[Q:] = w
-            gradient(conn[tile], x, geo, z, ws, ab, t, b)
-            square(conn[tile], b, inverse_mass, w, gam, out)
+@njit(fastmath=FAST)
+def _greatest(conn, b, inverse_mass, w, gamma, sums, greatest):  # type: ignore[no-untyped-def]
+    """The greater of `greatest` and gamma_bar sum_a |V b_a|^2/m_a / V over the lanes; b has the rows dim * a + i."""
+    na, lanes = conn.shape
+    dim = inverse_mass.shape[1]
+    square, V, mean = sums[:lanes], sums[lanes:2 * lanes], sums[2 * lanes:]
+    sums[:] = 0.0
+    for a in range(na):
+        for c in range(dim):
+            row = b[(dim * a + c) * lanes:(dim * a + c + 1) * lanes]
             for i in range(lanes):
-                if out[i] > greatest:
-                    greatest = out[i]
-        return greatest
+                square[i] += row[i] * row[i] * inverse_mass[conn[a, i], c]
+        for i in range(lanes):
+            V[i] += w[a * lanes + i]
+            mean[i] += w[a * lanes + i] * gamma[a * lanes + i]
+    for i in range(lanes):
+        value = mean[i] * square[i] / (V[i] * V[i])
+        greatest = value if value > greatest else greatest
+    return greatest
 
-    return loop
+
+@njit(_SIGNATURE, cache=True, fastmath=FAST, nogil=True)
+def volumetric_2d(conn, x, geometry, gamma, inverse_mass):  # type: ignore[no-untyped-def]
+    Q = 4 * LANES
+    z, ws, t = np.empty(8 * LANES), np.empty(11 * Q), np.empty(4 * Q)
+    ab, b, sums = np.zeros(2 * Q), np.empty(8 * LANES), np.empty(3 * LANES)
+    greatest = 0.0
+    for tile in range(conn.shape[0]):
+        geo, w = geometry[tile].reshape(-1), geometry[tile].reshape(-1)[4 * Q:]
+        ab[Q:] = w
+        force2d._gather(conn[tile], x, z)
+        force2d._kinematics(z, geo, ws)
+        force2d._stress(ws, geo, ab, t)
+        force2d._nodal_force(t, b)
+        greatest = _greatest(conn[tile], b, inverse_mass, w, gamma[tile].reshape(-1), sums, greatest)
+    return greatest
 
 
-volumetric_2d = _make(2)
-volumetric_3d = _make(3)
+@njit(_SIGNATURE, cache=True, fastmath=FAST, nogil=True)
+def volumetric_3d(conn, x, geometry, gamma, inverse_mass):  # type: ignore[no-untyped-def]
+    L, Q = LANES_3D, 8 * LANES_3D
+    z, F, P, t = np.empty(24 * L), np.empty(9 * Q), np.empty(9 * Q), np.empty(4 * Q)
+    ab, b, sums = np.zeros(2 * Q), np.empty(24 * L), np.empty(3 * L)
+    greatest = 0.0
+    for tile in range(conn.shape[0]):
+        geo, w = geometry[tile].reshape(-1), geometry[tile].reshape(-1)[9 * Q:]
+        ab[Q:] = w
+        force3d._gather(conn[tile], x, z)
+        for c in range(3):
+            force3d._gradient(z[8 * c * L:8 * (c + 1) * L], t)
+            force3d._push(t, geo, F[3 * c * Q:3 * (c + 1) * Q])
+        force3d._piola(F, ab, P)
+        for c in range(3):
+            force3d._pull(P[3 * c * Q:3 * (c + 1) * Q], geo, t)
+            force3d._nodal_force(t, b[c * L:])
+        greatest = _greatest(conn[tile], b, inverse_mass, w, gamma[tile].reshape(-1), sums, greatest)
+    return greatest
