@@ -1,4 +1,4 @@
-"""Command line of a case module, made from the signature and docstring of its function."""
+"""Command line of a case or study module, made from the signature and docstring of its function."""
 
 from __future__ import annotations
 
@@ -21,15 +21,18 @@ __all__ = ["command"]
 UNEXPECTED, BAD_INPUT, INTERRUPTED = 1, 2, 130
 
 
-def command(function: Callable[..., Any], arguments: list[str] | None = None) -> NoReturn:
-    """Run `function` with the command line's arguments; an error a user can cure is one line and exit status 2."""
+def command(function: Callable[..., Any], arguments: list[str] | None = None, package: str = "cases") -> NoReturn:
+    """Run `function` with the command line's arguments; an error a user can cure is one line and exit status 2.
+
+    `package` is the one whose module of the same name the function is called by: "cases" or "study".
+    """
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends a run as Ctrl-C does
     given: set[str] = set()
 
     def note(app: App, commands: tuple[str, ...], found: ArgumentCollection) -> None:
         given.update(argument.name.lstrip("-").replace("-", "_") for argument in found if argument.tokens)
 
-    app = App(name=f"python -m skfsink.cases.{function.__name__}", version=f"skfsink {__version__}", config=note,
+    app = App(name=f"python -m skfsink.{package}.{function.__name__}", version=f"skfsink {__version__}", config=note,
               group_commands=Group.create_ordered("Help"))
     app.default(function)
     try:

@@ -84,8 +84,9 @@ class Store:
 
     def save(self) -> None:
         """Write the file."""
-        write_summary(self.path, {"schema": SCHEMA, "study": self.study, "command": shlex.join(["python", *sys.orig_argv[1:]]),
-                                  "machine": self.machine, "points": self.points})
+        command = shlex.join(["python", *sys.orig_argv[1:]])
+        write_summary(self.path, {"schema": SCHEMA, "study": self.study, "command": command, "machine": self.machine,
+                                  "points": self.points})
 
     def _read(self) -> dict[str, Any]:
         try:

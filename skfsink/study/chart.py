@@ -1,0 +1,50 @@
+"""Charts of the studies, in the style of :mod:`skfsink.plot`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ..output import replaced
+from ..plot import DPI, STYLE, WIDTH
+from .pareto import pareto_front
+
+__all__ = ["draw_front", "page"]
+
+
+@contextmanager
+def page(path: str | Path, title: str, rows: int, columns: int, height: float) -> Iterator[list[Axes]]:
+    """A page with a grid of axes, `height` [in] tall; it is written to `path` (PNG) when the block has filled it.
+
+    The axes come row by row.
+    """
+    with matplotlib.rc_context(STYLE):
+        figure = Figure((WIDTH, height), layout="constrained")
+        axes: list[Axes] = figure.subplots(rows, columns, squeeze=False).ravel().tolist()
+        yield axes
+        figure.suptitle(title)
+        with replaced(path) as part:
+            figure.savefig(part, format="png", dpi=DPI)
+
+
+def draw_front(ax: Axes, cost: Sequence[float], error: Sequence[float], names: Sequence[str],
+               colour: str = "k") -> list[int]:
+    """Draw the Pareto front of points through their corners and number its points; returns them by rising cost.
+
+    The numbers are explained in a legend below the axes, by `names` of all points.
+    """
+    front = pareto_front(cost, error)
+    x, y = np.asarray(cost, float)[front], np.asarray(error, float)[front]
+    ax.step(x, y, where="post", color=colour, linewidth=0.9, zorder=1, label="Pareto front")
+    for number, i in enumerate(front, 1):
+        ax.annotate(str(number), (cost[i], error[i]), xytext=(3, 3), textcoords="offset points", fontsize=6.5,
+                    fontweight="bold")
+    text = "\n".join(f"{number}  {names[i]}" for number, i in enumerate(front, 1))
+    ax.text(0.0, -0.22, text, transform=ax.transAxes, fontsize=6, va="top", linespacing=1.3)
+    return front
