@@ -14,7 +14,7 @@ from numba import njit
 from scipy.sparse import csc_array, csr_array
 
 from .errors import ConvergenceError
-from .space import Pattern
+from .pattern import Pattern
 
 os.environ.setdefault("MKL_CBWR", "AUTO,STRICT")  # the same bits from one run to the next, whatever the alignment
 

@@ -17,80 +17,21 @@ committed on accepted steps only.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from .deletion import delete_failed
 from .density import DensitySolver
-from .direct import Factorization, symmetric_product
-from .errors import ConvergenceError, ParameterError, require
+from .direct import Factorization
+from .errors import ConvergenceError
+from .hht_controls import HHTControls
+from .inertia import Inertia
 from .momentum import Momentum
-from .space import Pattern
+from .pattern import Pattern
 from .state import State
 
-__all__ = ["COUPLINGS", "HHT", "MASSES", "HHTControls"]
-
-COUPLINGS = ("iterated", "single")
-MASSES = ("lumped", "consistent")
-
-
-@dataclass(frozen=True)
-class HHTControls:
-    """Options of the implicit integrator.
-
-    Parameters
-    ----------
-    alpha: damping parameter, in [-1/3, 0].
-    dt: largest time step [s], > 0.
-    dt_first: first time step [s], > 0; 0 takes `dt`.
-    dt_least: step below which the integration gives up [s], > 0.
-    coupling: "iterated" or "single".
-    mass: "lumped" by row sums, as in the explicit scheme, or "consistent" (Eq. 28). On a mesh of h = l/1.5 the
-        consistent one drives the crack 8 % faster; the two agree as h falls.
-    mass_floor: least lumped mass, as a fraction of the intact one, in [0, 1).
-    force_tolerance, correction_tolerance: ABAQUS-like tests, in (0, 0.1].
-    gamma_tolerance: change of gamma in the last iteration of a step, in (0, 0.1].
-    max_iterations: iterations after which a step is rejected, >= 3.
-    """
-
-    alpha: float = -0.05
-    dt: float = 1.6e-7
-    dt_first: float = 0.0
-    dt_least: float = 1e-13
-    coupling: str = "iterated"
-    mass: str = "lumped"
-    mass_floor: float = 1e-3
-    force_tolerance: float = 1e-3
-    correction_tolerance: float = 2e-3
-    gamma_tolerance: float = 1e-2
-    max_iterations: int = 16
-
-    def __post_init__(self) -> None:
-        require("hht-alpha", self.alpha, low=-1 / 3, high=0)
-        require("hht-dt", self.dt, "s", low=0, low_open=True)
-        require("hht-dt-first", self.dt_first, "s", low=0)
-        require("hht-dt-least", self.dt_least, "s", low=0, low_open=True)
-        require("force-tolerance", self.force_tolerance, low=0, high=0.1, low_open=True)
-        require("correction-tolerance", self.correction_tolerance, low=0, high=0.1, low_open=True)
-        require("gamma-tolerance", self.gamma_tolerance, low=0, high=0.1, low_open=True)
-        require("max-iterations", self.max_iterations, low=3, whole=True)
-        require("mass-floor", self.mass_floor, low=0, high=1, high_open=True)
-        if self.coupling not in COUPLINGS:
-            raise ParameterError(f"coupling must be one of {', '.join(COUPLINGS)}; got {self.coupling!r}")
-        if self.mass not in MASSES:
-            raise ParameterError(f"mass must be one of {', '.join(MASSES)}; got {self.mass!r}")
-
-    @property
-    def beta(self) -> float:
-        """Newmark's beta = (1 - alpha)^2/4."""
-        return (1 - self.alpha) ** 2 / 4
-
-    @property
-    def newmark_gamma(self) -> float:
-        """Newmark's gamma = 1/2 - alpha."""
-        return 0.5 - self.alpha
+__all__ = ["HHT", "HHTControls"]
 
 
 class _Trial(NamedTuple):
@@ -131,6 +72,7 @@ class HHT:
         self._held = ~free.reshape(-1, self.space.dim)
         self._grip_velocity = grip_velocity
         self._pattern = Pattern(self.space, self.space.dim, free, upper=True)
+        self.inertia = Inertia(momentum, self._pattern, free, self.controls.mass, self.controls.mass_floor)
         self.solver = Factorization(self._pattern, threads=threads)
         self.dt = self.controls.dt_first or self.controls.dt
         size = float(np.ptp(self.space.X, axis=0).max())
@@ -147,7 +89,7 @@ class HHT:
         self.reaction = self.momentum.force(state.u)
         self._W = self.momentum.W
         self._gamma = self.momentum.gamma
-        self._mass, self._places = self._mass_matrix(), self._masses()
+        self._mass, self._places = self.inertia.matrix(), self.inertia.places()
 
     def begin(self, state: State) -> None:
         """Set the body in motion: accelerations from the forces, energies of the start."""
@@ -158,37 +100,8 @@ class HHT:
         state.a[...] = 0.0
         state.a.reshape(-1)[self.free] = self.solver.solve(self._inertia)
         state.ledger.elastic = self.momentum.energy
-        state.ledger.kinetic = self._kinetic(self._mass, state.v)
+        state.ledger.kinetic = self.inertia.kinetic(self._mass, state.v)
         state.ledger.initial = state.ledger.elastic + state.ledger.kinetic
-
-    def _times(self, mass: np.ndarray, x: np.ndarray) -> np.ndarray:
-        p = self._pattern
-        return symmetric_product(p.indptr.view(np.uint32), p.indices.view(np.uint32), mass, x)
-
-    def _kinetic(self, mass: np.ndarray, v: np.ndarray) -> float:
-        free = v.ravel()[self.free]
-        return 0.5 * float(free @ self._times(mass, free))
-
-    def _masses(self) -> np.ndarray:
-        """Mass by place for the current gamma: at the nodes (n,), or for Eq. (28) at the Gauss points (ne, nq)."""
-        if self.controls.mass == "lumped":
-            return self.momentum.lumped_mass(self.controls.mass_floor)
-        return self.space.w * self.momentum.material.rho0 * self.momentum.gamma
-
-    def _half_v2(self, v: np.ndarray) -> np.ndarray:
-        """|v|^2/2 in the same places [mm^2/s^2]."""
-        if self.controls.mass == "lumped":
-            return 0.5 * np.einsum("ai,ai->a", v, v)
-        at_gauss = np.einsum("qa,eai->eqi", self.space.N, v[self.space.conn])
-        return 0.5 * np.einsum("eqi,eqi->eq", at_gauss, at_gauss)
-
-    def _mass_matrix(self) -> np.ndarray:
-        """Data of the mass matrix for the current gamma, on the pattern of the tangent."""
-        if self.controls.mass == "consistent":
-            return self.momentum.consistent_mass(self._pattern)
-        data = np.zeros(self._pattern.nnz)
-        data[self._pattern.diagonal] = np.repeat(self._masses(), self.space.dim)[self.free]
-        return data
 
     def run(self, state: State, t_end: float) -> Iterator[State]:
         """Step until `t_end` [s], yielding the state after each accepted step."""
@@ -225,19 +138,19 @@ class HHT:
         state.gamma = self.density.solve(state.W_max, state.gamma)
         momentum.set_gamma(state.gamma, state.deleted)
         ledger.drop(self.space.w, self._W, self._gamma, momentum.gamma)
-        masses = self._masses()
-        ledger.sink_kinetic += float(np.vdot(self._places - masses, self._half_v2(state.v)))
+        masses = self.inertia.places()
+        ledger.sink_kinetic += float(np.vdot(self._places - masses, self.inertia.half_v2(state.v)))
         self._gamma, self._places = momentum.gamma, masses
-        self._mass = self._mass_matrix()
+        self._mass = self.inertia.matrix()
         self.reaction = momentum.force(state.u)
-        self._inertia = self._times(self._mass, state.a.ravel()[self.free])
+        self._inertia = self.inertia.times(self._mass, state.a.ravel()[self.free])
 
     def _attempt(self, state: State, dt: float) -> tuple[_Trial | None, int]:
         c, momentum = self.controls, self.momentum
         free = self.free
         gamma = state.gamma
         momentum.set_gamma(gamma, state.deleted)
-        mass = self._mass_matrix()
+        mass = self.inertia.matrix()
         shape = state.u.shape
         base = state.u + dt * state.v + dt * dt * (0.5 - c.beta) * state.a
         if dt <= self._transit:
@@ -252,7 +165,7 @@ class HHT:
             force = momentum.force(u)
             if not (momentum.least_J > self.LEAST_J and np.isfinite(momentum.energy)):
                 return None, iteration
-            inertia = self._times(mass, a.ravel()[free])
+            inertia = self.inertia.times(mass, a.ravel()[free])
             r = inertia + ((1 + c.alpha) * force - c.alpha * self.reaction).ravel()[free]
             live = np.repeat(self.space.lump(momentum.gamma) > 1e-3 * self._volume, shape[1])[free]
             level = momentum.tiles.mean_force() + float(np.mean(np.abs(inertia[live]))) + self._rounding[0]
@@ -261,7 +174,7 @@ class HHT:
             if balanced and correction <= c.correction_tolerance * increment and settled:
                 if dt > self._failing_step and float((state.gamma - gamma).max()) > 0.5:
                     return None, iteration  # converged, but to a crack that has run through a single step
-                return _Trial(u, a, gamma, force, momentum.W, mass, self._masses()), iteration
+                return _Trial(u, a, gamma, force, momentum.W, mass, self.inertia.places()), iteration
             if iteration == c.max_iterations:
                 break
             data = mass / (c.beta * dt * dt) + (1 + c.alpha) * momentum.tangent(self._pattern, u)
@@ -284,7 +197,7 @@ class HHT:
                 settled = float(np.abs(new - gamma).max()) <= c.gamma_tolerance
                 gamma = new
                 momentum.set_gamma(gamma, state.deleted)
-                mass = self._mass_matrix()
+                mass = self.inertia.matrix()
         return None, c.max_iterations
 
     @property
@@ -310,15 +223,15 @@ class HHT:
         v1_full = state.v.copy()
         v1_full.reshape(-1)[free] = v1
         m0, m1 = self._places, trial.places
-        k0, k1 = self._half_v2(state.v), self._half_v2(v1_full)
+        k0, k1 = self.inertia.half_v2(state.v), self.inertia.half_v2(v1_full)
         both = np.maximum(m0 + m1, 1e-300)
         ledger.sink_kinetic += float(np.sum((m0 - m1) / both * (m0 * k0 + m1 * k1)))
         # numerical dissipation: the scheme's equations put into the change of kinetic energy at that mean gamma
         dM = trial.mass - self._mass
         inertia = -((1 + c.alpha) * trial.force - c.alpha * self.reaction).ravel()[free]
         da, mean_a = a1 - a0, 0.5 * (a0 + a1)
-        M_mean_a = 0.5 * (inertia + self._inertia) - 0.25 * self._times(dM, da)
-        M_da = inertia - self._inertia - self._times(dM, mean_a)
+        M_mean_a = 0.5 * (inertia + self._inertia) - 0.25 * self.inertia.times(dM, da)
+        M_da = inertia - self._inertia - self.inertia.times(dM, mean_a)
         v_mean = du.ravel()[free] / dt - dt * (c.beta - g / 2) * da
         motion = dt * float(v_mean @ (M_mean_a + (g - 0.5) * M_da))
         motion -= float(np.sum((m0 - m1) ** 2 / (2 * both) * (k1 - k0)))
@@ -339,12 +252,12 @@ class HHT:
         if delete_failed(self.space, state, self.deletion, self.density.law.failure_energy).size:
             momentum.set_gamma(state.gamma, state.deleted)
             ledger.deletion += float(np.einsum("eq,eq,eq->", w, before - momentum.gamma, trial.W))
-        self._mass, self._places = self._mass_matrix(), self._masses()
-        moving = self._kinetic(trial.mass, state.v)
+        self._mass, self._places = self.inertia.matrix(), self.inertia.places()
+        moving = self.inertia.kinetic(trial.mass, state.v)
         dead = self.space.lump(momentum.gamma) <= 0.0
         state.v[dead] = 0.0
         state.a[dead] = 0.0
-        kinetic = self._kinetic(self._mass, state.v)
+        kinetic = self.inertia.kinetic(self._mass, state.v)
         ledger.deletion += moving - kinetic  # with what the mass floor of dead nodes still had
         ledger.kinetic = kinetic
         self.reaction = momentum.force(state.u)

@@ -7,11 +7,18 @@ import numpy as np
 from . import kernels
 from .errors import ParameterError
 from .material import Material
-from .space import Pattern, Space
+from .pattern import Pattern
+from .space import Space
 
-__all__ = ["ELEMENTS", "Momentum"]
+__all__ = ["ELEMENTS", "Momentum", "check_element"]
 
-ELEMENTS = ("jbar", "plain")
+ELEMENTS = ("jbar", "plain", "planestress")
+
+
+def check_element(element: str, space: Space) -> None:
+    """Refuse an element that is not made for the dimension of `space` (ParameterError)."""
+    if element == "planestress" and space.dim == 3:
+        raise ParameterError("element planestress is for meshes of quadrilaterals; this one has hexahedra: take jbar")
 
 
 class Momentum:
@@ -20,23 +27,26 @@ class Momentum:
     Parameters
     ----------
     space, material: the spaces and the stored energy.
-    element: "jbar" for the element-constant J_bar, "plain" for the standard element.
+    element: "jbar" for the element-constant J_bar, "plain" for the standard element, "planestress" for a thin sheet of
+        quadrilaterals, whose forces, energies and masses are per mm of undeformed thickness as in plane strain.
     force_floor: Gauss points with gamma below this exert no force. Their stiffness and mass are then gone together.
 
     Attributes
     ----------
     gamma: effective relative density at the Gauss points, zero in deleted elements and below the floor, (ne, nq).
     energy: gamma-weighted stored energy at the last evaluation [N mm; N mm/mm in 2D].
-    least_J: least J at a Gauss point with gamma > 0 at the last evaluation.
+    least_J: least J (plane stress: its part in the plane) at a Gauss point with gamma > 0 at the last evaluation.
     evaluations: how often the force was evaluated.
     """
 
     def __init__(self, space: Space, material: Material, element: str = "jbar", force_floor: float = 1e-3) -> None:
         if element not in ELEMENTS:
             raise ParameterError(f"element must be one of {', '.join(ELEMENTS)}; got {element!r}")
+        check_element(element, space)
         self.space, self.material, self.force_floor = space, material, force_floor
         self.j_bar = element == "jbar"
-        self.tiles = kernels.Tiles(space)
+        self.plane_stress = element == "planestress"
+        self.tiles = kernels.Tiles(space, self.plane_stress)
         self.energy = 0.0
         self.least_J = 1.0
         self.evaluations = 0
@@ -72,7 +82,20 @@ class Momentum:
 
     def tangent(self, pattern: Pattern, u: np.ndarray, convex: bool = False) -> np.ndarray:
         """Data of the tangent stiffness at `u` on `pattern`; with `convex` one that is positive at every point."""
+        if self.plane_stress:
+            return kernels.tangent_plane_stress(self.space, pattern, self.material, u, self.gamma, convex)
         return kernels.tangent(self.space, pattern, self.material, u, self.gamma, self.j_bar, convex)
+
+    def stiffest(self, u: np.ndarray, inverse_mass: np.ndarray) -> float:
+        """Cheap indicator of the highest frequency squared at `u`, and below it [1/s^2].
+
+        The greatest Rayleigh quotient of what each element resists most: a change of volume, or of area in plane
+        stress. `inverse_mass` (n, dim) is zero where a degree of freedom is held.
+        """
+        x, m = self.space.X + u, self.material
+        if self.plane_stress:
+            return self.tiles.plane_stiffness(x, m.compiled_law, self._constants, m.bulk_modulus, inverse_mass)
+        return self.tiles.volumetric(x, inverse_mass) * m.bulk_modulus
 
     def consistent_mass(self, pattern: Pattern) -> np.ndarray:
         """Data of the mass matrix of Eq. (28) on `pattern`."""

@@ -14,7 +14,7 @@ import numpy as np
 from .direct import Factorization
 from .errors import ConvergenceError
 from .momentum import Momentum
-from .space import Pattern
+from .pattern import Pattern
 
 __all__ = ["Newton"]
 

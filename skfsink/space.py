@@ -22,6 +22,7 @@ from numba import njit
 from scipy.sparse import coo_array, csr_array
 
 from .errors import MeshError
+from .pattern import Pattern
 
 __all__ = ["Pattern", "Space"]
 
@@ -212,112 +213,40 @@ def _reference(dim: int) -> tuple[np.ndarray, np.ndarray]:
     return N, dN
 
 
-class Pattern:
-    """Fixed sparsity of an assembled matrix, and where each element entry goes in it.
-
-    The CSR structure is that of the mesh graph, with `block` unknowns a node, restricted to the unknowns marked in
-    `free` and, if `upper`, to the upper triangle (what a symmetric factorisation wants). It does not depend on
-    values, so a factorisation keeps its analysis for the whole run.
-
-    Attributes
-    ----------
-    indptr, indices: CSR structure, rows and columns numbered over the free unknowns.
-    slot: (ne, nd, nd) position of element entry (i, j) in the data array; -1 where it is not stored.
-    """
-
-    def __init__(self, space: Space, block: int = 1, free: np.ndarray | None = None, upper: bool = False) -> None:
-        n = space.n_nodes * block
-        free = np.ones(n, bool) if free is None else free
-        number = np.where(free, np.cumsum(free) - 1, -1).astype(np.int32)
-        node = space.graph
-        # the rows of the node graph, each repeated for every component, each entry widened to a block
-        width = np.diff(node.indptr)
-        rows = np.repeat(np.arange(n), np.repeat(width, block) * block)
-        wide = (node.indices[:, None] * block + np.arange(block)).ravel()
-        starts = np.repeat(node.indptr[:-1], block) * block
-        lengths = np.repeat(width, block) * block
-        within = np.arange(rows.size) - np.repeat(np.cumsum(lengths) - lengths, lengths)
-        cols = wide[np.repeat(starts, lengths) + within]
-        keep = free[rows] & free[cols]
-        if upper:
-            keep &= cols >= rows
-        self.size = int(free.sum())
-        self.upper = upper
-        self.indices = number[cols[keep]].astype(np.int32)
-        counts = np.bincount(number[rows[keep]], minlength=self.size)
-        self.indptr = np.concatenate(([0], np.cumsum(counts))).astype(np.int32)
-        dofs = (space.conn[:, :, None] * block + np.arange(block)).reshape(space.n_elements, -1)
-        self.slot = np.empty((*dofs.shape, dofs.shape[1]), np.int32)
-        _find_slots(number[dofs], self.indptr, self.indices, upper, self.slot)
-        self.diagonal = np.empty(self.size, np.int32)
-        _find_diagonal(self.indptr, self.indices, self.diagonal)
-
-    @property
-    def nnz(self) -> int:
-        """Number of stored entries."""
-        return int(self.indices.size)
-
-    def matrix(self, data: np.ndarray) -> csr_array:
-        """CSR matrix with this structure over `data` (not copied)."""
-        return csr_array((data, self.indices, self.indptr), shape=(self.size, self.size), copy=False)
-
-    def symmetric(self, data: np.ndarray) -> csr_array:
-        """The whole symmetric matrix, whichever half is stored."""
-        half = self.matrix(data)
-        if not self.upper:
-            return half
-        return csr_array(half + half.T - _diagonal(half))
-
-
-def _diagonal(matrix: csr_array) -> csr_array:
-    n = matrix.shape[0]
-    return csr_array((matrix.diagonal(), (np.arange(n), np.arange(n))), shape=(n, n))
-
-
 @njit(cache=True)
 def _at_gauss(nodal, conn, N, out):  # type: ignore[no-untyped-def]
-    nq, na = N.shape
+    if conn.shape[1] == 4:
+        for e in range(conn.shape[0]):
+            x0, x1, x2, x3 = nodal[conn[e, 0]], nodal[conn[e, 1]], nodal[conn[e, 2]], nodal[conn[e, 3]]
+            for q in range(4):
+                out[e, q] = N[q, 0] * x0 + N[q, 1] * x1 + N[q, 2] * x2 + N[q, 3] * x3
+        return
+    x = np.empty(8)
     for e in range(conn.shape[0]):
-        for q in range(nq):
+        for a in range(8):
+            x[a] = nodal[conn[e, a]]
+        for q in range(8):
             total = 0.0
-            for a in range(na):
-                total += N[q, a] * nodal[conn[e, a]]
+            for a in range(8):
+                total += N[q, a] * x[a]
             out[e, q] = total
 
 
 @njit(cache=True)
 def _lump(w, values, conn, N, out):  # type: ignore[no-untyped-def]
-    nq, na = N.shape
+    if conn.shape[1] == 4:
+        for e in range(conn.shape[0]):
+            x0, x1 = w[e, 0] * values[e, 0], w[e, 1] * values[e, 1]
+            x2, x3 = w[e, 2] * values[e, 2], w[e, 3] * values[e, 3]
+            for a in range(4):
+                out[conn[e, a]] += x0 * N[0, a] + x1 * N[1, a] + x2 * N[2, a] + x3 * N[3, a]
+        return
+    x = np.empty(8)
     for e in range(conn.shape[0]):
-        for a in range(na):
+        for q in range(8):
+            x[q] = w[e, q] * values[e, q]
+        for a in range(8):
             total = 0.0
-            for q in range(nq):
-                total += w[e, q] * values[e, q] * N[q, a]
+            for q in range(8):
+                total += x[q] * N[q, a]
             out[conn[e, a]] += total
-
-
-@njit(cache=True)
-def _find_slots(dofs, indptr, indices, upper, slot):  # type: ignore[no-untyped-def]
-    for e in range(dofs.shape[0]):
-        for i in range(dofs.shape[1]):
-            for j in range(dofs.shape[1]):
-                r, c = dofs[e, i], dofs[e, j]
-                if r < 0 or c < 0 or (upper and c < r):
-                    slot[e, i, j] = -1
-                    continue
-                low, high = indptr[r], indptr[r + 1] - 1
-                while low < high:
-                    middle = (low + high) // 2
-                    if indices[middle] < c:
-                        low = middle + 1
-                    else:
-                        high = middle
-                slot[e, i, j] = low
-
-
-@njit(cache=True)
-def _find_diagonal(indptr, indices, diagonal):  # type: ignore[no-untyped-def]
-    for r in range(diagonal.size):
-        for k in range(indptr[r], indptr[r + 1]):
-            if indices[k] == r:
-                diagonal[r] = k

@@ -14,7 +14,8 @@ from skfsink.density import DensitySolver
 from skfsink.direct import Factorization
 from skfsink.material import AAA, Material, NeoHookean, SinkLaw
 from skfsink.momentum import Momentum
-from skfsink.space import Pattern, Space
+from skfsink.pattern import Pattern
+from skfsink.space import Space
 
 SIZES = {"quad": (8, 16, 32), "hex": (4, 8, 12)}
 

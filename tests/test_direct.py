@@ -10,7 +10,8 @@ from skfsink.direct import Factorization
 from skfsink.errors import ConvergenceError
 from skfsink.material import AAA
 from skfsink.momentum import Momentum
-from skfsink.space import Pattern, Space
+from skfsink.pattern import Pattern
+from skfsink.space import Space
 
 BACKENDS = pytest.mark.parametrize("backend", ["pardiso", "superlu"])
 

@@ -14,7 +14,8 @@ from skfsink.errors import MeshError, ParameterError
 from skfsink.forms import density_forms, momentum_forms
 from skfsink.material import AAA, NeoHookean, SinkLaw
 from skfsink.momentum import Momentum
-from skfsink.space import Pattern, Space
+from skfsink.pattern import Pattern
+from skfsink.space import Space
 
 ROUNDING = 1e-12
 both_elements = pytest.mark.parametrize("element", ["jbar", "plain"])

@@ -18,7 +18,8 @@ from skfsink.forms import momentum_forms
 from skfsink.hht import HHTControls
 from skfsink.kernels import Tiles, tangent
 from skfsink.material import AAA, Material, NeoHookean, SinkLaw
-from skfsink.space import Pattern, Space
+from skfsink.pattern import Pattern
+from skfsink.space import Space
 
 MATERIALS = [AAA(), NeoHookean()]
 every_material = pytest.mark.parametrize("material", MATERIALS, ids=["AAA", "NeoHookean"])

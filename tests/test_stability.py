@@ -13,7 +13,7 @@ from skfsink.explicit import Explicit, ExplicitControls, highest_frequency
 from skfsink.hht import HHT, HHTControls
 from skfsink.material import AAA, SinkLaw
 from skfsink.momentum import Momentum
-from skfsink.space import Pattern
+from skfsink.pattern import Pattern
 from skfsink.state import State
 from skfsink.statics import Statics
 

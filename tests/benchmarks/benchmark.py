@@ -34,8 +34,9 @@ from skfsink.explicit import Explicit
 from skfsink.forms import momentum_forms
 from skfsink.material import AAA, SinkLaw
 from skfsink.momentum import Momentum
+from skfsink.pattern import Pattern
 from skfsink.sample import Sample, load_sample
-from skfsink.space import Pattern, Space
+from skfsink.space import Space
 from skfsink.state import State
 from skfsink.study.machine import machine
 
