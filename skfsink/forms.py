@@ -24,7 +24,8 @@ from .kernels import ERSATZ_STIFFNESS, SOFT_GAMMA
 from .kernels.lanes import J_FLOOR
 from .material import Material
 
-__all__ = ["DensityForms", "MomentumForms", "density_forms", "element_mean", "momentum_forms"]
+__all__ = ["DensityForms", "MomentumForms", "density_forms", "element_mean", "momentum_forms",
+           "plane_stress_forms"]
 
 
 @dataclass(frozen=True)
@@ -116,6 +117,29 @@ def momentum_forms(material: Material, j_bar: bool = True) -> MomentumForms:
         return w["gamma"] * material.rho0 * dot(a, v)
 
     return MomentumForms(residual, tangent, mass)
+
+
+def plane_stress_forms(material: Material) -> MomentumForms:
+    """Forms of the momentum balance of a thin sheet: F_33 at each point is such that P_33 = 0."""
+
+    def sheet(w: Any) -> np.ndarray:
+        H = np.moveaxis(w["displacement"].grad, (0, 1), (-2, -1))
+        return material.thin_sheet(H + np.eye(2))
+
+    @LinearForm
+    def residual(v: Any, w: Any) -> np.ndarray:
+        P = np.moveaxis(material.first_piola(sheet(w))[..., :2, :2], (-2, -1), (0, 1))
+        return w["gamma"] * ddot(P, grad(v))
+
+    @BilinearForm
+    def tangent(du: Any, v: Any, w: Any) -> np.ndarray:
+        A = np.moveaxis(material.modulus(sheet(w)), (-4, -3, -2, -1), (0, 1, 2, 3))
+        A = A[:2, :2, :2, :2] - np.einsum("iJ...,kL...->iJkL...", A[:2, :2, 2, 2], A[2, 2, :2, :2]) / A[2, 2, 2, 2]
+        a, b = grad(du), grad(v)
+        ersatz = np.where(w["gamma"] < SOFT_GAMMA, ERSATZ_STIFFNESS * material.shear_modulus, 0.0) * ddot(a, b)
+        return w["gamma"] * np.einsum("iJ...,iJkL...,kL...->...", b, A, a) + ersatz
+
+    return MomentumForms(residual, tangent, momentum_forms(material).mass)
 
 
 def density_forms(length_scale: float, epsilon: float) -> DensityForms:

@@ -78,7 +78,7 @@ class Options:
     front
         Quasi-static: a sweep fails the points with at least this share of the greatest stored energy, in [0, 1].
     element
-        "jbar" (element-constant J̄) or "plain" (standard Q1, locks).
+        "jbar" (element-constant J̄), "plain" (standard Q1, locks) or "planestress" (thin sheet with free faces, in 2D).
     event_time
         Longest dynamic event [s], > 0.
     aftermath

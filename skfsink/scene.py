@@ -17,7 +17,7 @@ from .errors import OutputError, ParameterError, require
 from .explicit import ExplicitControls
 from .hht import HHTControls
 from .material import Material, SinkLaw
-from .momentum import ELEMENTS
+from .momentum import ELEMENTS, check_element
 from .sample import Sample
 from .statics import StaticsControls
 
@@ -51,7 +51,7 @@ class Controls:
     analysis: "dynamic" or "quasistatic" ("both" is two runs).
     integrator: "explicit" or "hht", for the dynamic event.
     sink: "lumped", "consistent" or "nearest".
-    element: "jbar" or "plain".
+    element: "jbar", "plain" or "planestress" (thin sheets in two dimensions).
     overshoot: how far past the onset the state is scaled before the event, relative to the displacement, (0, 0.1].
     deletion: gamma at which an element fails, (0, 1e-2].
     force_floor: gamma below which a Gauss point exerts no force, [0, 0.1].
@@ -117,6 +117,8 @@ class Scene:
     ------
     MeshError
         The mesh lacks the boundary of a grip.
+    ParameterError
+        The element is not for meshes of this dimension.
     """
 
     case: str
@@ -134,6 +136,7 @@ class Scene:
     def __post_init__(self) -> None:
         for grip in self.grips:
             self.sample.nodes(grip.boundary)
+        check_element(self.controls.element, self.sample.space)
 
     def part(self, analysis: str) -> Scene:
         """This scene in one of the two analyses."""

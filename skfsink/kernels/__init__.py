@@ -4,11 +4,14 @@ force2d, force3d   internal force, stored energy and its density; explicit steps
 volumetric         the indicator of the highest frequency, from passes of these two
 tiles              the memory layout those two work on
 tangent            tangent stiffness with material, geometric and J_bar coupling
+plane_stress       all of these for thin sheets
 scalar             mass, Laplacian and sink matrices
 """
 
+from .plane_stress import tangent_plane_stress
 from .scalar import laplacian, mass, weighted_mass
 from .tangent import ERSATZ_STIFFNESS, SOFT_GAMMA, tangent
 from .tiles import Tiles
 
-__all__ = ["ERSATZ_STIFFNESS", "SOFT_GAMMA", "Tiles", "laplacian", "mass", "tangent", "weighted_mass"]
+__all__ = ["ERSATZ_STIFFNESS", "SOFT_GAMMA", "Tiles", "laplacian", "mass", "tangent",
+           "tangent_plane_stress", "weighted_mass"]

@@ -20,6 +20,7 @@ from ..space import Space
 from .force2d import force_2d
 from .force3d import force_3d
 from .lanes import LANES, LANES_3D
+from .plane_stress import force_plane_stress, stiffness_plane_stress
 from .volumetric import volumetric_2d, volumetric_3d
 
 __all__ = ["Tiles"]
@@ -36,7 +37,7 @@ class Tiles:
     lanes: elements in a tile.
     """
 
-    def __init__(self, space: Space) -> None:
+    def __init__(self, space: Space, plane_stress: bool = False) -> None:
         self.space = space
         ne, na, dim = space.n_elements, space.conn.shape[1], space.dim
         self.lanes = LANES if dim == 2 else LANES_3D
@@ -49,6 +50,8 @@ class Tiles:
         self.psi = np.zeros((self.count, self.lanes))
         self._force = np.zeros((self.count, na * dim, self.lanes))
         self._kernel: Callable[..., float] = force_2d if dim == 2 else force_3d
+        if plane_stress:
+            self._kernel = force_plane_stress
         start, entry = space.incidence
         element, local = np.divmod(entry, na)
         tile, lane = np.divmod(element, self.lanes)
@@ -90,6 +93,12 @@ class Tiles:
         """
         loop = volumetric_2d if self.space.dim == 2 else volumetric_3d
         return float(loop(self.conn, x, self.geometry, self.gamma, inverse_mass))
+
+    def plane_stiffness(self, x: np.ndarray, law: CompiledLaw, constants: np.ndarray, bulk_modulus: float,
+                        inverse_mass: np.ndarray) -> float:
+        """What :meth:`volumetric` times k is, for plane stress, where nothing resists a change of area but shear."""
+        return float(stiffness_plane_stress(law, constants, bulk_modulus, self.conn, x, self.geometry, self.gamma,
+                                            inverse_mass))
 
     def mean_force(self) -> float:
         """Mean magnitude of the forces the elements exert on their nodes, by component, at the last evaluation.
