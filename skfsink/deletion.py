@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from .momentum import Momentum
 from .space import Space
 from .state import State
 
-__all__ = ["delete_failed"]
+__all__ = ["delete_failed", "left_in"]
 
 
 def delete_failed(space: Space, state: State, threshold: float, failure_energy: float) -> np.ndarray:
@@ -24,3 +25,15 @@ def delete_failed(space: Space, state: State, threshold: float, failure_energy: 
         state.deletions.extend((state.time, int(e)) for e in failed)
         state.ledger.paper += failure_energy * float(space.V[failed].sum())
     return failed
+
+
+def left_in(momentum: Momentum, gamma: np.ndarray, failed: np.ndarray) -> float:
+    """Stored energy [N mm; N mm/mm in 2D] that the elements `failed` still bear at the nodal density `gamma` (n,).
+
+    It is that of the last force evaluation, and zero where `gamma` is below the force floor at all Gauss points, as
+    with the defaults: elements that fail bear no force any more.
+    """
+    at_gauss = momentum.effective(gamma, np.zeros(momentum.space.n_elements, bool))[failed]
+    if not at_gauss.any():
+        return 0.0
+    return float(np.einsum("eq,eq,eq->", momentum.space.w[failed], at_gauss, momentum.W[failed]))

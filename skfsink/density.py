@@ -93,7 +93,8 @@ class DensitySolver:
         if result is None:
             result = self._factorise(data)
         if not np.isfinite(result).all():
-            raise ConvergenceError("the relative density is not finite: the stored energy of a Gauss point overflowed")
+            raise ConvergenceError("the relative density is not finite: the stored energy of a Gauss point "
+                                   "overflowed; lower --courant or --hht-dt")
         if self.sink != "consistent" and not (result.min() > -1e-9 and result.max() < 1 + 1e-6):
             raise ConvergenceError(f"the relative density left (0, 1]: {result.min():.3g} to {result.max():.6g}; the "
                                    f"mesh has elements so flat that the lumped sink loses its maximum principle")

@@ -24,7 +24,7 @@ import numpy as np
 import scipy.sparse.linalg as sla
 from numba import njit
 
-from .deletion import delete_failed
+from .deletion import delete_failed, left_in
 from .density import DensitySolver
 from .direct import symmetric_product
 from .errors import InstabilityError, require
@@ -191,7 +191,8 @@ class Explicit:
         state.gamma = self.density.solve(state.W_max, state.gamma, self.REDUCTION)
         if self.density.solves == solves:
             return
-        delete_failed(self.space, state, self.deletion, self.density.law.failure_energy)
+        failed = delete_failed(self.space, state, self.deletion, self.density.law.failure_energy)
+        left = left_in(momentum, state.gamma, failed) if failed.size else 0.0
         before, mass = momentum.gamma, self.mass
         momentum.set_gamma(state.gamma, state.deleted)
         self.mass = momentum.lumped_mass(self.controls.mass_floor)
@@ -199,7 +200,8 @@ class Explicit:
         used = self.space.n_elements - (momentum.tiles.count - 1) * taken.shape[2]
         taken[-1, :, used:] = 0.0
         stored = float(np.vdot(taken, self._W))
-        ledger.sink_stored += stored
+        ledger.sink_stored += stored - left
+        ledger.deletion += left
         ledger.sink_kinetic += 0.5 * float((mass - self.mass) @ np.einsum("ai,ai->a", state.v, state.v))
         self._elastic -= stored
         ledger.elastic = self._elastic

@@ -16,6 +16,7 @@ committed on accepted steps only.
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -32,6 +33,8 @@ from .pattern import Pattern
 from .state import State
 
 __all__ = ["HHT", "HHTControls"]
+
+log = logging.getLogger(__name__)
 
 
 class _Trial(NamedTuple):
@@ -127,7 +130,8 @@ class HHT:
             self.dt *= 0.5
             if self.dt < self.controls.dt_least:
                 raise ConvergenceError(f"the implicit integration stalled at t = {state.time:.4g} s: no step down to "
-                                       f"{self.controls.dt_least:.1g} s converges; lower hht-dt or use explicit")
+                                       f"{self.controls.dt_least:.1g} s converges; lower --hht-dt (now "
+                                       f"{self.controls.dt:g} s), or take --integrator explicit")
         self._accept(state, trial, self.dt)
         if iterations <= self.controls.max_iterations // 2:
             self.dt = min(self.dt * self.GROW, self.controls.dt)
@@ -173,7 +177,11 @@ class HHT:
             balanced = np.abs(r[live]).max() <= c.force_tolerance * level
             if balanced and correction <= c.correction_tolerance * increment and settled:
                 if dt > self._failing_step and float((state.gamma - gamma).max()) > 0.5:
-                    return None, iteration  # converged, but to a crack that has run through a single step
+                    # converged, but to a crack that has run through a single step
+                    log.warning("a step of %.3g s would let a crack run through at once: steps in which elements fail "
+                                "are cut to 0.1 l/c_s = %.3g s; --hht-dt at or below it spares the attempts", dt,
+                                self._failing_step)
+                    return None, iteration
                 return _Trial(u, a, gamma, force, momentum.W, mass, self.inertia.places()), iteration
             if iteration == c.max_iterations:
                 break

@@ -73,7 +73,7 @@ def summarize(scene: Scene, simulation: Simulation) -> dict[str, Any]:
                    "external_work": onset["work"] + ledger.work, "deletion": ledger.deletion,
                    "numerical": ledger.numerical, "released": ledger.released,
                    "balance_error_relative": max(balances, default=0.0) / scale},
-        "deleted_elements": int(state.deleted.sum()),
+        "deleted_elements": int(state.deleted.sum()), "warnings": simulation.notes.texts,
         "cost": {"wall_s": {k: round(v, 3) for k, v in cost["wall"].items()}, "steps": cost["steps"],
                  "gamma_solves": cost["gamma_solves"], "factorisations": cost["factorisations"],
                  "peak_rss_mb": round(peak_rss_mb(), 1)},

@@ -12,6 +12,7 @@ from .density import DensitySolver
 from .energy import Ledger
 from .errors import CheckpointError, SkfsinkError
 from .explicit import Explicit
+from .guards import Notes
 from .hht import HHT
 from .momentum import Momentum
 from .progress import Display, Interrupt
@@ -61,6 +62,7 @@ class Simulation:
                                c.threads)
         self.recorder = Recorder(scene, folder, self.momentum, self.density,
                                  stored[2]["recorder"] if stored else None)
+        self.notes = Notes(display.say, stored[2].get("warnings", []) if stored else [])
         self.state = State.intact(space)
         self.integrator: Explicit | HHT | None = None
         self.wall = {"loading": 0.0, "event": 0.0, "output": 0.0}
@@ -72,9 +74,10 @@ class Simulation:
     # --- the phases ---
     def run(self, onset: State | None = None) -> State:
         """Run to the end from where the state is; `onset` is a state already loaded to the onset."""
-        with Interrupt() as interrupt:
+        with Interrupt() as interrupt, self.notes:
             self._interrupt = interrupt
             if self.state.phase == "loading":
+                self.recorder.guard.check_scene()
                 if onset is None:
                     self._load()
                 else:
@@ -218,7 +221,7 @@ class Simulation:
             self.integrator.sync(self.state)
             memories["integrator"] = self.integrator.memory()
         save_checkpoint(self.folder / self.CHECKPOINT, self.scene.fingerprint, self.state, memories,
-                        {"recorder": self.recorder.memory(), "cost": self.cost()})
+                        {"recorder": self.recorder.memory(), "cost": self.cost(), "warnings": self.notes.kept})
 
     def _restore(self, state: State, memories: dict[str, Any], extra: dict[str, Any]) -> None:
         self.state = state

@@ -8,6 +8,7 @@ analysis would turn into motion.
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -21,6 +22,8 @@ from .newton import Newton
 from .state import State
 
 __all__ = ["Statics", "StaticsControls"]
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -80,6 +83,8 @@ class Statics:
         self.newton = Newton(momentum, free, self.controls.tolerance, self.controls.max_newton, threads)
         self.settled = False      #: whether the last sweep of `propagate` found nothing left to change
         self.increment = 0.0      #: current load increment, as load time [s]; 0 before the first
+        self.refused = ""         #: why the last increment was given up: "no equilibrium", "runs away" or "passes"
+        self.factor = 0.0         #: ratio of the last two changes of gamma in the iteration of the two fields
 
     def equilibrium(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Displacement in equilibrium at the current gamma, from the guess `u`; see :meth:`.Newton.equilibrium`."""
@@ -104,7 +109,7 @@ class Statics:
         """Iterate the two fields from the guess `u`; (u, force, gamma, W_max, W), or None if they run away."""
         c = self.controls
         gamma, W_max = state.gamma, state.W_max
-        last, growing = np.inf, 0
+        last, growing, self.refused = np.inf, 0, "no equilibrium"
         for _ in range(c.max_passes):
             try:
                 u, force = self.newton.equilibrium(u, max(c.tolerance, min(1e-5, 1e-3 * last)))
@@ -118,10 +123,12 @@ class Statics:
             self.momentum.set_gamma(gamma, state.deleted)
             if change <= c.gamma_tolerance:
                 return u, force, gamma, W_max, W
-            growing = growing + 1 if change > 0.98 * last else 0
+            growing, self.factor = growing + 1 if change > 0.98 * last else 0, change / last
             if growing >= 3 or gamma.min() < 0.2:
+                self.refused = "runs away"
                 return None
             last = change
+        self.refused = "passes"
         return None
 
     def load(self, state: State) -> Iterator[State]:
@@ -144,12 +151,13 @@ class Statics:
             try:
                 settled = self._settle(state, self._predict(state.u, self.increment))
             except ConvergenceError:
-                settled = None
+                settled, self.refused = None, "no equilibrium"
             if settled is None:
                 self.increment *= 0.5
                 if self.increment <= c.onset_tolerance * (state.grip + self.increment):
                     if state.grip == 0.0:
                         raise ConvergenceError("the body finds no equilibrium under the smallest load increment")
+                    self._doubt()
                     self.momentum.set_gamma(state.gamma, state.deleted)
                     self.momentum.force(state.u)
                     return
@@ -194,7 +202,7 @@ class Statics:
                     raise ConvergenceError(f"the crack has not crossed the sample at {limit:g} times the onset load")
             else:
                 before = self.momentum.energy
-                state.u, _ = self.newton.equilibrium(state.u, most=self.SNAP)
+                state.u = self._relax(state)
                 ledger.released += before - self.momentum.energy
             W = self.momentum.W
             postponed = self._follow(state, W)
@@ -212,6 +220,24 @@ class Statics:
             ledger.elastic = float(np.einsum("eq,eq,eq->", self.space.w, W, self.momentum.gamma))
             self.settled = change <= self.controls.gamma_tolerance and not postponed
             yield state
+
+    def _doubt(self) -> None:
+        """Say so where the onset is not where the sink runs away."""
+        if self.refused == "passes":
+            log.warning("the onset may be too low: the last load increment was given up after %d passes over the two "
+                        "fields while the change of gamma still fell (by a factor of %.3f a pass); raise max_passes",
+                        self.controls.max_passes, self.factor)
+        elif self.refused == "no equilibrium":
+            log.warning("the onset is where Newton's method ends, not where the sink runs away: the body may buckle or "
+                        "be torn by its grips; refine the mesh, or check grips and constants")
+
+    def _relax(self, state: State) -> np.ndarray:
+        """The equilibrium of a sweep; the history follows equilibria only, or the sink would kill the mesh."""
+        try:
+            return self.newton.equilibrium(state.u, most=self.SNAP)[0]
+        except ConvergenceError as error:
+            raise ConvergenceError(f"sweep {state.step + 1}: {error}; the history follows equilibria only: take "
+                                   f"another mesh, or --analysis dynamic") from None
 
     def _follow(self, state: State, W: np.ndarray) -> bool:
         """Let the history follow `W` (ne, nq) where failure is nearest; True if points that fail had to wait.

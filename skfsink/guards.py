@@ -1,0 +1,255 @@
+"""Guards of a run: where a method leaves its range the run says so, or stops, with the cure.
+
+A *warning* says that results depend on something they should not depend on; the run goes on, and `summary.json` lists
+it. An *error* stops a run whose state can no longer be trusted. Thresholds stand here, as class attributes; what they
+are based on is in `docs/stability.md`.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Sequence
+from types import TracebackType
+
+import numpy as np
+
+from . import indicators
+from .errors import InstabilityError
+from .momentum import Momentum
+from .scene import Scene
+from .state import State
+
+__all__ = ["Guard", "Notes"]
+
+log = logging.getLogger(__name__)
+
+
+class Notes(logging.Handler):
+    """The warnings of a run, each once: shown when they come up, and kept.
+
+    As a context manager it listens to all modules of the package. Two warnings are the same if they were made from the
+    same text, whatever the numbers in it.
+
+    Parameters
+    ----------
+    show: what to do with a new one.
+    kept: what :attr:`kept` was in an earlier session of the run.
+
+    Attributes
+    ----------
+    kept: (text before numbers were put in, text) of each.
+    """
+
+    def __init__(self, show: Callable[[str], None], kept: Sequence[Sequence[str]] = ()) -> None:
+        super().__init__(logging.WARNING)
+        self._show = show
+        self.kept: list[tuple[str, str]] = [(str(form), str(text)) for form, text in kept]
+
+    @property
+    def texts(self) -> list[str]:
+        """The warnings, in the order they came up."""
+        return [text for _, text in self.kept]
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Take up a warning."""
+        form = str(record.msg)
+        if form not in (known for known, _ in self.kept):
+            self.kept.append((form, record.getMessage()))
+            self._show("warning: " + self.kept[-1][1])
+
+    def __enter__(self) -> Notes:
+        logging.getLogger(__package__).addHandler(self)
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, value: BaseException | None,
+                 trace: TracebackType | None) -> None:
+        logging.getLogger(__package__).removeHandler(self)
+
+
+class Guard:
+    """Watches one run of a scene.
+
+    Parameters
+    ----------
+    scene: what is computed, with the tolerance `balance_tolerance` of its ledger.
+    momentum: of the run; its last force evaluation and its density are looked at.
+    """
+
+    LOCKS = 50.0           # k/mu past which the plain element is warned of
+    STIFF = 1e6            # k/mu past which rounding reaches the equilibria
+    COARSE = 1.2           # l/h below which the mesh decides where and when it cracks
+    SHARP = 60.0           # degrees by which a notch may turn at one node
+    CHECKERED = 0.05       # energy of an alternating pressure, of the energy limiter
+    FLAT = 0.2             # J below which a live point is close to being turned inside out
+    LIVE = 0.5             # gamma of a point that must not be inside out
+    NEGATIVE = -1e-6       # gamma below which a nodal density is no rounding
+    SUDDEN = 0.05, 20      # share of the elements, and their number, that may fail in one step
+    DEAD = 0.2             # mean density below which a body is gone
+    CARRIED = 0.01         # energy in deleted elements, of the onset energy, that is warned of
+
+    def __init__(self, scene: Scene, momentum: Momentum) -> None:
+        self.scene, self.momentum = scene, momentum
+        self.space = scene.sample.space
+        self.scale = 0.0     #: energy at the onset, to which the others are compared
+        self._deleted = -1   # elements at the last step
+        self._inside_out = False
+
+    @property
+    def _step_cure(self) -> str:
+        c = self.scene.controls
+        if c.analysis == "quasistatic":
+            return "lower --front, or compute with --analysis dynamic"
+        if c.integrator == "explicit":
+            return f"lower --courant (now {c.explicit.courant:g})"
+        return f"lower --hht-dt (now {c.hht.dt:g} s)"
+
+    # --- before the run ---
+    def check_scene(self) -> None:
+        """Warn of a material, an element or a mesh beyond the range of the methods."""
+        material, space, l = self.scene.material, self.space, self.scene.sink_law.length_scale
+        ratio = material.bulk_modulus / material.shear_modulus
+        if self.scene.controls.element == "plain" and ratio > self.LOCKS:
+            log.warning("the plain element locks at k/mu = %.4g (above %g): stiffness, onset load and U come out too "
+                        "high; take --element jbar", ratio, self.LOCKS)
+        if ratio > self.STIFF and self.scene.controls.element != "planestress":
+            log.warning("k/mu = %.3g is so large (above %g) that rounding reaches the equilibria and the explicit step "
+                        "falls with its root; at --bulk-modulus %.3g the solid is as good as incompressible", ratio,
+                        self.STIFF, 1e3 * material.shear_modulus)
+        h = float(space.h.min())
+        if h > l / self.COARSE:
+            log.warning("no element is finer than h = %.3g mm, l/h = %.2f (less than %g): onset and U are those of the "
+                        "mesh; refine it to h <= l/3, or raise --length-scale", h, l / h, self.COARSE)
+        angle, place = indicators.turning(space)
+        if angle > self.SHARP:
+            log.warning("a notch turns by %.0f degrees at one node, at %s mm (above %g): it is as sharp as elements "
+                        "are small, which moves onset and U; round it with at least 4 elements", angle,
+                        _place(place), self.SHARP)
+
+    def check_onset(self, state: State) -> None:
+        """Look at the state at the onset: where it will crack, and whether it is an equilibrium worth starting from.
+
+        Raises
+        ------
+        InstabilityError
+            The ledger of the loading does not close, or a live point is inside out.
+        """
+        space, l, k = self.space, self.scene.sink_law.length_scale, self.scene.material.bulk_modulus
+        weakest = int(np.argmin(state.gamma))
+        h = indicators.size_near(space, weakest, l)
+        if h > l / self.COARSE:
+            log.warning("where it begins to fail, at %s mm, elements have h = %.3g mm, l/h = %.2f (less than %g): "
+                        "onset and U are those of the mesh; refine it there to h <= l/3, or raise --length-scale",
+                        _place(space.X[weakest]), h, l / h, self.COARSE)
+        amplitude = indicators.alternation(space, indicators.element_pressure(space, state.u, k))
+        share = amplitude**2 / (2 * k) / self.scene.sink_law.phi
+        if share > self.CHECKERED and self.scene.controls.element == "jbar":
+            log.warning("pressures of neighbouring elements alternate by %.3g MPa (checkerboard), which is %.2g of the "
+                        "energy limiter (above %g): break up the rows of the mesh, or lower --bulk-modulus", amplitude,
+                        share, self.CHECKERED)
+        error, allowed = state.ledger.error(state.ledger.elastic), self.scene.controls.balance_tolerance
+        if not error <= allowed:
+            raise InstabilityError(f"the ledger of the loading is open by {error:.2%} of the stored energy, allowed "
+                                   f"{allowed:.2%}: take smaller load increments, or raise --balance-tolerance")
+        self._check_shape(state)
+
+    # --- during the event ---
+    def check_step(self, state: State) -> None:
+        """Look at what every step leaves behind; a few comparisons.
+
+        Raises
+        ------
+        InstabilityError
+            Energy has been fed in, or is no number; too much failed at once; a live point is inside out.
+        """
+        ledger = state.ledger
+        fed = -ledger.numerical / self.scale
+        allowed = self.scene.controls.balance_tolerance
+        if not (fed <= allowed and np.isfinite(ledger.elastic + ledger.kinetic)):
+            raise InstabilityError(f"energy fed in by the integrator {fed:.2%} of the onset energy at "
+                                   f"{self._when(state)}, allowed {allowed:.2%}: {self._step_cure}; only then raise "
+                                   f"--balance-tolerance")
+        before, self._deleted = self._deleted, len(state.deletions)
+        failed, share = self._deleted - before, self.SUDDEN[0] * self.space.n_elements
+        if before >= 0 and failed > max(share, self.SUDDEN[1]):
+            raise InstabilityError(f"{failed} of {self.space.n_elements} elements failed in one step at "
+                                   f"{self._when(state)}, allowed {max(int(share), self.SUDDEN[1])}: this is no crack "
+                                   f"but a mesh that dies of a bad state; {self._step_cure}")
+        if self.momentum.least_J <= 0.0 and not self._inside_out:
+            self._check_shape(state)
+
+    def check_record(self, state: State) -> None:
+        """Look at the whole state, at each row of the history.
+
+        Raises
+        ------
+        InstabilityError
+            The ledger is open, a field is not finite, the body is gone, or a live point is inside out.
+        """
+        ledger, space, l = state.ledger, self.space, self.scene.sink_law.length_scale
+        allowed, scale = self.scene.controls.balance_tolerance, self.scale
+        worst, name = max((ledger.error(scale), "energy balance error"),
+                          (ledger.deletion / scale, "energy lost in deleted elements"), key=_nan_first)
+        if not worst <= allowed:
+            cure = self._deletion_cure if "deleted" in name else self._step_cure
+            raise InstabilityError(f"{name} {worst:.2%} of the onset energy at {self._when(state)}, allowed "
+                                   f"{allowed:.2%}: {cure}; only then raise --balance-tolerance")
+        if not (np.isfinite(state.u).all() and np.isfinite(state.v).all() and np.isfinite(state.gamma).all()):
+            raise InstabilityError(f"a field is not finite at {self._when(state)}: {self._step_cure}")
+        if ledger.deletion > self.CARRIED * scale:
+            log.warning("elements were deleted with %.2g of the onset energy still in them (above %g): %s",
+                        ledger.deletion / scale, self.CARRIED, self._deletion_cure)
+        if ledger.numerical > allowed * scale:
+            log.warning("the time integration itself has dissipated %.2g of the onset energy (above %g): %s%s",
+                        ledger.numerical / scale, allowed, self._step_cure,
+                        ", or an --hht-alpha nearer to 0" if self.scene.controls.integrator == "hht" else "")
+        least = float(state.gamma.min())
+        if least < self.NEGATIVE:
+            log.warning("the relative density falls to %.2g: the %s sink has no maximum principle; such points are "
+                        "taken as dead. --sink lumped keeps it in (0, 1]", least, self.scene.controls.sink)
+        if indicators.mean_density(space, state.gamma) < self.DEAD:
+            raise InstabilityError(f"less than {self.DEAD:.0%} of the body is left at {self._when(state)}: this is no "
+                                   f"crack but a mesh that dies of a bad state; {self._step_cure}")
+        h = space.h[state.deleted]
+        coarse = h > l / self.COARSE
+        if coarse.sum() > max(2, 0.2 * h.size):
+            e = int(np.flatnonzero(state.deleted)[np.argmax(h)])
+            log.warning("the crack runs through elements of h = %.3g mm, l/h = %.2f (less than %g), near %s mm: its "
+                        "width and U are those of the mesh there; refine it to h <= l/3", float(h.max()),
+                        l / float(h.max()), self.COARSE, _place(space.X[space.conn[e]].mean(axis=0)))
+        if self.momentum.least_J < self.FLAT:
+            self._check_shape(state)
+
+    def _check_shape(self, state: State) -> None:
+        """Live points that are nearly or wholly inside out."""
+        least = self.momentum.least_J
+        if least >= self.FLAT:
+            return
+        count, gamma = indicators.inverted(self.space, state.u, self.momentum.gamma)
+        if gamma > self.LIVE:
+            raise InstabilityError(f"{count} Gauss point(s) with a relative density of up to {gamma:.2f} are inside "
+                                   f"out (J <= 0) at {self._when(state)}: {self._step_cure}, or refine the mesh there")
+        if count:
+            self._inside_out = True
+            log.warning("%d damaged Gauss point(s) are inside out (J <= 0), with a relative density of up to %.2g: "
+                        "their force means nothing; raise --force-floor, or refine the mesh there", count, gamma)
+        else:
+            log.warning("a live Gauss point is compressed to J = %.2g (below %g): elements soon turn inside out there; "
+                        "refine the mesh where it is pressed", least, self.FLAT)
+
+    @property
+    def _deletion_cure(self) -> str:
+        c = self.scene.controls
+        return f"lower --deletion (now {c.deletion:g}) or raise --force-floor (now {c.force_floor:g}) above it"
+
+    def _when(self, state: State) -> str:
+        if self.scene.controls.analysis == "quasistatic" and state.phase == "event":
+            return f"sweep {state.step}"
+        return f"t = {state.time:.4g} s"
+
+
+def _place(x: np.ndarray) -> str:
+    return "(" + ", ".join(f"{value:.3g}" for value in x) + ")"
+
+
+def _nan_first(entry: tuple[float, str]) -> float:
+    return np.inf if np.isnan(entry[0]) else entry[0]

@@ -1,0 +1,95 @@
+"""Measures of how sound a mesh or a state is, as numbers: what the guards and the stability study look at."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .space import Space
+
+__all__ = ["alternation", "element_pressure", "inverted", "mean_density", "size_near", "turning"]
+
+
+def turning(space: Space) -> tuple[float, np.ndarray]:
+    """Greatest angle [degrees] by which the body's surface turns inwards at a node (2D) or an edge (3D), and its place.
+
+    A round notch meshed by n elements turns by 180/n at a node, a square one by 90, a slit by 180; convex corners do
+    not count. The angle is that of the body around the node or edge, less 180 degrees.
+    """
+    dim, conn = space.dim, space.conn
+    corners = np.arange(2**dim)
+    outer = _outer(space)                                  # (ne, 2 dim): whether face 2 axis + side is on the surface
+    keys, angles, on_surface = [], [], []
+    for along in range(dim) if dim == 3 else [-1]:
+        i, j = (axis for axis in range(dim) if axis != along)
+        for a in corners if dim == 2 else corners[(corners >> along & 1) == 0]:
+            ends = [a] if dim == 2 else [a, a | 1 << along]
+            arms = [sum(space.X[conn[:, end ^ 1 << axis]] - space.X[conn[:, end]] for end in ends)  # type: ignore[misc]
+                    for axis in (i, j)]
+            if dim == 3:
+                edge = space.X[conn[:, ends[1]]] - space.X[conn[:, ends[0]]]
+                edge /= np.linalg.norm(edge, axis=1, keepdims=True)
+                arms = [arm - np.einsum("ei,ei->e", arm, edge)[:, None] * edge for arm in arms]
+            lengths = np.linalg.norm(arms[0], axis=1) * np.linalg.norm(arms[1], axis=1)
+            cosine = np.einsum("ei,ei->e", *arms) / lengths
+            angles.append(np.arccos(np.clip(cosine, -1.0, 1.0)))
+            keys.append(np.sort(conn[:, ends], axis=1))
+            on_surface.append(outer[:, 2 * i + (a >> i & 1)] | outer[:, 2 * j + (a >> j & 1)])
+    places, where = np.unique(np.concatenate(keys), axis=0, return_inverse=True)
+    where = where.ravel()
+    around = np.bincount(where, np.concatenate(angles), len(places))
+    around[np.bincount(where, np.concatenate(on_surface), len(places)) == 0] = 0.0
+    worst = int(np.argmax(around))
+    return float(np.degrees(around[worst]) - 180.0), space.X[places[worst]].mean(axis=0)
+
+
+def _outer(space: Space) -> np.ndarray:
+    """Mask (ne, 2 dim) of the faces (in 2D: sides) that belong to one element only, numbered 2 axis + side."""
+    corners = np.arange(2**space.dim)
+    faces = np.stack([np.sort(space.conn[:, corners[(corners >> axis & 1) == side]], axis=1)
+                      for axis in range(space.dim) for side in range(2)], axis=1)
+    _, index, count = np.unique(faces.reshape(-1, faces.shape[2]), axis=0, return_inverse=True, return_counts=True)
+    mask: np.ndarray = (count == 1)[index.ravel()].reshape(faces.shape[:2])
+    return mask
+
+
+def size_near(space: Space, node: int, radius: float) -> float:
+    """Mean size h [mm] of the elements with a node within `radius` [mm] of a node."""
+    near = np.linalg.norm(space.X - space.X[node], axis=1) <= radius
+    return float(space.h[near[space.conn].any(axis=1)].mean())
+
+
+def inverted(space: Space, u: np.ndarray, gamma: np.ndarray) -> tuple[int, float]:
+    """Gauss points with gamma > 0 and J <= 0 at the displacement `u`: their number, and the greatest gamma there.
+
+    `gamma` (ne, nq) is the density that the force sees.
+    """
+    F = np.eye(space.dim) + space.gradient(u)
+    inside_out = (np.linalg.det(F) <= 0.0) & (gamma > 0.0)
+    return int(inside_out.sum()), float(gamma[inside_out].max(initial=0.0))
+
+
+def element_pressure(space: Space, u: np.ndarray, bulk_modulus: float) -> np.ndarray:
+    """k (J_bar - 1) of the elements at the displacement `u` [MPa], (ne,)."""
+    F = np.eye(space.dim) + space.gradient(u)
+    return bulk_modulus * (space.element_mean(np.linalg.det(F)) - 1.0)
+
+
+def alternation(space: Space, pressure: np.ndarray, weight: np.ndarray | None = None) -> float:
+    """Amplitude [MPa] with which element pressures (ne,) alternate: rms of what a smoothing over the nodes takes away.
+
+    Each element is compared with the mean over its nodes of the mean over their elements: a pressure that is linear in
+    space passes on an even mesh, a checkerboard is taken away as a whole. `weight` (ne,) of the elements, by default
+    their volume.
+    """
+    weight = space.V if weight is None else space.V * weight
+    elements = np.repeat(np.arange(space.n_elements), space.conn.shape[1])
+    nodes = space.conn.ravel()
+    total = np.bincount(nodes, weight[elements], space.n_nodes)
+    at_nodes = np.bincount(nodes, (weight * pressure)[elements], space.n_nodes) / np.maximum(total, 1e-300)
+    rough = pressure - at_nodes[space.conn].mean(axis=1)
+    return float(np.sqrt(weight @ rough**2 / max(float(weight.sum()), 1e-300)))
+
+
+def mean_density(space: Space, gamma: np.ndarray) -> float:
+    """Mean of the nodal relative density over the body."""
+    return float(np.einsum("eq,eq->", space.w, space.at_gauss(gamma)) / space.V.sum())
