@@ -216,8 +216,12 @@ class Explicit:
         """Steps between solves for gamma."""
         if self.controls.gamma_every:
             return self.controls.gamma_every
-        transit = self.density.law.length_scale / (self.momentum.material.shear_wave_speed * 1e3)
-        return min(max(1, int(self.GAMMA_INTERVAL * transit / self.dt)), self.GAMMA_MOST)
+        return min(max(1, int(self._interval / self.dt)), self.GAMMA_MOST)
+
+    @property
+    def _interval(self) -> float:
+        """Longest time between solves for gamma that leaves the motion of a crack accurate [s]."""
+        return self.GAMMA_INTERVAL * self.density.law.length_scale / (self.momentum.material.shear_wave_speed * 1e3)
 
     # --- the step size ---
     def _set_step(self, state: State) -> None:
@@ -233,6 +237,8 @@ class Explicit:
             self.estimates += 1
             self._urgent = False
         self.dt = float(c.courant * 2.0 / (self._omega * np.sqrt(max(1.0, ratio))))
+        if not c.gamma_every:
+            self.dt = min(self.dt, self._interval)  # in plane stress the stable step may be longer
 
     def _indicator(self, u: np.ndarray) -> float:
         """A lower bound of omega_max^2 that follows it closely; see :meth:`.Momentum.stiffest`."""
