@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable
 
 import numpy as np
@@ -12,7 +13,7 @@ from scipy.sparse import csc_array, csr_array
 
 from .direct import unsigned
 
-__all__ = ["AmgCG"]
+__all__ = ["AmgCG", "residual"]
 
 
 class AmgCG:
@@ -46,20 +47,33 @@ class AmgCG:
             np.random.set_state(state)
         self._P: csr_array | None = None
         if len(levels.levels) > 1:
-            self._P = csr_array(levels.levels[0].P)
-            self._R = csr_array(self._P.T)
-            coarse = csr_array(levels.levels[1].A)
-            self._coarse: Callable[[np.ndarray], np.ndarray]
-            if coarse.shape[0] <= self.DIRECT_COARSE:
-                self._coarse = sla.splu(csc_array(coarse), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
-                                        options={"SymmetricMode": True}).solve
-            else:
-                np.random.seed(0)
-                try:
-                    cycle = pyamg.smoothed_aggregation_solver(coarse, improve_candidates=None).aspreconditioner()
-                finally:
-                    np.random.set_state(state)
-                self._coarse = cycle.matvec
+            self._correct_on(csr_array(levels.levels[0].P), csr_array(levels.levels[1].A))
+
+    def _correct_on(self, P: csr_array, coarse: csr_array) -> None:
+        """Take `coarse` as the second level, with the prolongation P."""
+        self._P, self._R, self._coarse_matrix = P, csr_array(P.T), coarse
+        self._coarse: Callable[[np.ndarray], np.ndarray]
+        if coarse.shape[0] <= self.DIRECT_COARSE:
+            self._coarse = sla.splu(csc_array(coarse), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
+                                    options={"SymmetricMode": True}).solve
+            return
+        state = np.random.get_state()
+        np.random.seed(0)
+        try:
+            cycle = pyamg.smoothed_aggregation_solver(coarse, improve_candidates=None).aspreconditioner()
+        finally:
+            np.random.set_state(state)
+        self._coarse = cycle.matvec
+
+    def restricted(self, nodes: np.ndarray) -> AmgCG:
+        """The same for the principal block of the unknowns `nodes`: their part of the hierarchy, none made anew."""
+        part = copy.copy(self)
+        part._diagonal0 = self._diagonal0[nodes]
+        if self._P is not None:
+            P = self._P[nodes]
+            used = np.unique(P.indices)
+            part._correct_on(csr_array(P[:, used]), csr_array(self._coarse_matrix[used][:, used]))
+        return part
 
     def _radius(self, intact: csr_array) -> float:
         """Spectral radius of D^-1 A of the intact matrix; sinks only lower it."""
@@ -71,35 +85,37 @@ class AmgCG:
                                       matvec=lambda x: scale * (intact @ (scale * x.ravel())))
         return float(sla.eigsh(operator, k=1, which="LA", v0=start, tol=1e-2, return_eigenvectors=False)[0])
 
-    def solve(self, A: csr_array, D: np.ndarray, b: np.ndarray, x: np.ndarray,
-              reduction: float = 0.0) -> np.ndarray | None:
+    def dead(self, D: np.ndarray) -> np.ndarray:
+        """Mask of the unknowns whose sink has grown so far that the coarse level leaves them out."""
+        return D >= self.DEAD * self._diagonal0
+
+    def solve(self, A: csr_array, D: np.ndarray, b: np.ndarray, x: np.ndarray, tolerance: float | None = None,
+              size: float | None = None) -> np.ndarray | None:
         """Solution of A x = b from the guess `x`; None if it did not converge in `max_iterations`.
 
-        `D` is the diagonal of A. With `reduction` the solve may stop when the residual is that fraction of the one of
-        the guess, or 1e-6, whichever is less: what is left then is that fraction of what the solve had to change.
+        `D` is the diagonal of A. It ends at a residual of `tolerance` (that of the solver if not given) relative to
+        `size`, by default the norm of b.
         """
         smoother = self.omega / D
-        live = (self.DEAD * self._diagonal0 > D).astype(float)
+        live = (~self.dead(D)).astype(float)
         indptr, indices, data = unsigned(A)
-        size = float(np.linalg.norm(b))
+        tolerance, size = tolerance or self.tolerance, size or float(np.linalg.norm(b))
         r = np.empty_like(b)
         x = x.copy()
         # one Jacobi sweep puts the unknowns with a huge diagonal where they belong
         _residual(indptr, indices, data, x, b, r)
         x += r / D
-        target, total = 0.0, 0
+        total = 0
         for attempt in range(3):
             _residual(indptr, indices, data, x, b, r)
             self.residual = float(np.linalg.norm(r)) / size
-            if attempt == 0:
-                target = max(self.tolerance, min(reduction * self.residual, 1e-6))
-            if self.residual <= target or attempt == 2:
+            if self.residual <= tolerance or attempt == 2:
                 break
-            if self._iterate(A, r, x, smoother, live, target * size) is None:
+            if self._iterate(A, r, x, smoother, live, tolerance * size) is None:
                 return None
             total += self.iterations
         self.iterations = total
-        return x if self.residual <= 2 * target else None
+        return x if self.residual <= 2 * tolerance else None
 
     def _iterate(self, A: csr_array, r: np.ndarray, x: np.ndarray, smoother: np.ndarray, live: np.ndarray,
                  target: float) -> bool | None:
@@ -123,6 +139,13 @@ class AmgCG:
             if _advance(rz / pq, p, q, x, r) <= target:
                 return True
         return None
+
+
+def residual(A: csr_array, x: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """b - A x."""
+    r = np.empty_like(b)
+    _residual(*unsigned(A), x, b, r)
+    return r
 
 
 @njit(cache=True)

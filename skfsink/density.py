@@ -14,6 +14,7 @@ import logging
 
 import numpy as np
 from numba import njit
+from scipy.sparse import csr_array
 
 from . import kernels
 from .amg import AmgCG
@@ -21,6 +22,7 @@ from .direct import Factorization
 from .errors import ConvergenceError, ParameterError
 from .material import SinkLaw
 from .space import Pattern, Space
+from .zone import ActiveZone
 
 __all__ = ["SINKS", "DensitySolver"]
 
@@ -37,6 +39,7 @@ class DensitySolver:
     law: sink and flux parameters.
     sink: one of `SINKS`.
     unchanged: a solve is left out when no sink coefficient moved by more than this, relatively, since the last one.
+    active_zone: solves with a tolerance of their own are made where gamma changes (see :mod:`.zone`).
 
     Attributes
     ----------
@@ -46,7 +49,7 @@ class DensitySolver:
     """
 
     def __init__(self, space: Space, law: SinkLaw, sink: str = "lumped", tolerance: float = 1e-8,
-                 unchanged: float = 1e-12) -> None:
+                 unchanged: float = 1e-12, active_zone: bool = True) -> None:
         if sink not in SINKS:
             raise ParameterError(f"sink must be one of {', '.join(SINKS)}; got {sink!r}")
         self.space, self.law, self.sink = space, law, sink
@@ -56,23 +59,31 @@ class DensitySolver:
         self._laplacian = kernels.laplacian(space, self.pattern, law.length_scale**2)
         self._direct: Factorization | None = None
         self._amg = AmgCG(self.pattern.matrix(self._assemble(np.ones_like(space.w))), tolerance)
+        self.zone = ActiveZone(space.X, law.length_scale, self._amg) if active_zone and sink != "consistent" else None
         self.last_sink: np.ndarray | None = None  #: coefficients of the last solve, (ne, nq)
+        self._residual = 0.0
         self.solves = self.skipped = self.iterations = self.fallbacks = 0
 
     @property
     def residual(self) -> float:
-        """True relative residual of the last iterative solve."""
-        return self._amg.residual
+        """True relative residual of the last iterative solve, over the whole body."""
+        return self._residual
+
+    @property
+    def _error(self) -> float:
+        """Bound of the error of gamma: A^-1 is positive, and A carries gamma = 1 to at least the load."""
+        return 1e-9 + self._residual * float(np.linalg.norm(self.load) / self.load.min())
 
     @property
     def factorisations(self) -> int:
         """Numerical factorisations made so far."""
         return 0 if self._direct is None else self._direct.count
 
-    def solve(self, W_max: np.ndarray, gamma: np.ndarray, reduction: float = 0.0) -> np.ndarray:
+    def solve(self, W_max: np.ndarray, gamma: np.ndarray,
+              tolerance: float | None = None) -> np.ndarray:
         """Nodal gamma (n,) for the history `W_max` (ne, nq) [MPa], from the guess `gamma`.
 
-        With `reduction` the residual need fall only to that fraction of the guess's (see :meth:`AmgCG.solve`).
+        Given a `tolerance` for the relative residual other than the solver's, it is looked for in the active zone first.
 
         Raises
         ------
@@ -87,27 +98,42 @@ class DensitySolver:
         data = self._assemble(sink)
         result = None
         if self.sink != "consistent" or sink.max() < 1e3 * sink.min():
-            diagonal = data[self.pattern.diagonal]
-            result = self._amg.solve(self.pattern.matrix(data), diagonal, self.load, gamma, reduction)
-            self.iterations += self._amg.iterations
+            result = self._iterate(self.pattern.matrix(data), data[self.pattern.diagonal], gamma, tolerance)
         if result is None:
             result = self._factorise(data)
         if not np.isfinite(result).all():
             raise ConvergenceError("the relative density is not finite: the stored energy of a Gauss point "
                                    "overflowed; lower --courant or --hht-dt")
-        if self.sink != "consistent" and not (result.min() > -1e-9 and result.max() < 1 + 1e-6):
+        if self.sink != "consistent" and not (-self._error < result.min() and result.max() < 1 + self._error):
             raise ConvergenceError(f"the relative density left (0, 1]: {result.min():.3g} to {result.max():.6g}; the "
                                    f"mesh has elements so flat that the lumped sink loses its maximum principle")
         self.last_sink = sink
         return result
 
+    def _iterate(self, A: csr_array, D: np.ndarray, gamma: np.ndarray, tolerance: float | None) -> np.ndarray | None:
+        """Solution by AMG-CG, in the active zone where that is enough; None if it did not converge."""
+        if self.zone is not None and tolerance is not None:
+            gamma, met, iterations = self.zone.solve(A, D, self.load, gamma, tolerance)
+            self.iterations += iterations
+            self._residual = self.zone.residual
+            if met:
+                return gamma
+        result = self._amg.solve(A, D, self.load, gamma, tolerance)
+        self.iterations += self._amg.iterations
+        self._residual = self._amg.residual
+        return result
+
     def memory(self) -> dict[str, np.ndarray]:
         """What the solver remembers, for a checkpoint."""
-        return {} if self.last_sink is None else {"last_sink": self.last_sink}
+        if self.last_sink is None:
+            return {}
+        return {"last_sink": self.last_sink, **(self.zone.memory() if self.zone is not None else {})}
 
     def restore(self, memory: dict[str, np.ndarray]) -> None:
         """Take up what :meth:`memory` gave."""
         self.last_sink = memory.get("last_sink")
+        if self.zone is not None and "zone_seen" in memory:
+            self.zone.restore(memory, self.pattern.matrix(self._laplacian))
 
     def _assemble(self, sink: np.ndarray) -> np.ndarray:
         if self.sink == "consistent":

@@ -101,7 +101,7 @@ class Explicit:
 
     GAMMA_INTERVAL = 0.03  # l/c_s between solves for gamma; the crack then runs less than 3 % of l
     GAMMA_MOST = 20  # steps between them at the most, lest a failing element that shortens the step keeps failing
-    REDUCTION = 1e-3  # of the residual in a solve for gamma: the error is that fraction of the change since the last
+    GAMMA_TOLERANCE = 1e-6  # relative residual of a solve for gamma
     CHECK = 5        # steps between looks at the cheap indicator
     FED_IN = 1e-6    # energy a step may feed in before omega_max is estimated at once, of the initial energy
 
@@ -136,7 +136,7 @@ class Explicit:
     def begin(self, state: State) -> None:
         """Set the body in motion: accelerations from the forces, energies of the start."""
         self.start(state)
-        state.v[...] = self._grip_velocity
+        np.copyto(state.v, self._grip_velocity, where=~self._free)
         state.a[...] = np.where(self._free, -self.reaction / self.mass[:, None], 0.0)
         state.ledger.initial = state.ledger.elastic = self._elastic
         state.ledger.kinetic = self._kinetic(state)
@@ -188,7 +188,7 @@ class Explicit:
         momentum, ledger = self.momentum, state.ledger
         self.sync(state)
         solves = self.density.solves
-        state.gamma = self.density.solve(state.W_max, state.gamma, self.REDUCTION)
+        state.gamma = self.density.solve(state.W_max, state.gamma, self.GAMMA_TOLERANCE)
         if self.density.solves == solves:
             return
         failed = delete_failed(self.space, state, self.deletion, self.density.law.failure_energy)

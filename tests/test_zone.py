@@ -1,0 +1,95 @@
+"""The active zone: gamma solved where it changes, checked everywhere."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from bodies import box
+
+from skfsink.amg import residual
+from skfsink.density import DensitySolver
+from skfsink.explicit import Explicit
+from skfsink.material import SinkLaw
+from skfsink.space import Space
+from skfsink.zone import ActiveZone
+
+TOLERANCE = Explicit.GAMMA_TOLERANCE
+LAW = SinkLaw(length_scale=0.02)  # the body is 1 mm wide: fifty lengths l
+
+
+@pytest.fixture(scope="module")
+def space() -> Space:
+    """A square of 1 mm of 4,900 quadrilaterals."""
+    return box("quad", 70, 0.1)
+
+
+def history(space: Space, *tips: float) -> np.ndarray:
+    """Stored energy of cracks from the left edge to x = tip, one above the other."""
+    middle = space.X[space.conn].mean(axis=1) / space.X.max()
+    W = np.zeros_like(space.w)
+    for tip, y in zip(tips, (0.3, 0.8)):
+        W[(abs(middle[:, 1] - y) < 0.01) & (middle[:, 0] < tip)] = 1.0
+    return W
+
+
+def run(space: Space, solver: DensitySolver, gamma: np.ndarray, *tips: tuple[float, float]) -> np.ndarray:
+    """Solves while two cracks run on."""
+    for pair in tips:
+        gamma = solver.solve(history(space, *pair), gamma, TOLERANCE)
+    return gamma
+
+
+PATH = [(0.3 + 0.01 * i, 0.1 + 0.005 * i) for i in range(20)]
+
+
+def whole_residual(space: Space, solver: DensitySolver, W: np.ndarray, gamma: np.ndarray) -> float:
+    """Relative residual of the density equation, from the matrix assembled anew; dead nodes scaled to their sink."""
+    A = solver.pattern.matrix(solver._assemble(1 / (LAW.history(W) + LAW.epsilon)))
+    r = residual(A, gamma, solver.load)
+    return float(np.linalg.norm(r) / np.linalg.norm(solver.load))
+
+
+def test_the_zone_gives_what_a_solve_everywhere_gives(space: Space):
+    """Fails if the zone is too small, its matrix or its coupling to the outside wrong, or if it is not used."""
+    zoned, everywhere = DensitySolver(space, LAW), DensitySolver(space, LAW, active_zone=False)
+    ones = np.ones(space.n_nodes)
+    gamma, exact = run(space, zoned, ones, *PATH), run(space, everywhere, ones, *PATH)
+    assert everywhere.zone is None
+    assert zoned.zone.solves > 10
+    assert zoned.zone.nodes.size < 0.6 * space.n_nodes
+    assert whole_residual(space, zoned, history(space, *PATH[-1]), gamma) <= 2 * TOLERANCE
+    assert np.abs(gamma - exact).max() < 1e-4
+
+
+def test_a_zone_that_is_too_small_is_found_out(space: Space, monkeypatch: pytest.MonkeyPatch):
+    """Fails if the residual outside the zone is not looked at: the solve everywhere has to follow."""
+    monkeypatch.setattr(ActiveZone, "RADIUS", 0.5)
+    monkeypatch.setattr(ActiveZone, "MARGIN", 0.5)
+    solver = DensitySolver(space, LAW)
+    gamma = run(space, solver, np.ones(space.n_nodes), *PATH)
+    assert solver.zone.misses > 5
+    assert whole_residual(space, solver, history(space, *PATH[-1]), gamma) <= 2 * TOLERANCE
+
+
+def test_damage_far_outside_the_zone_is_not_overlooked(space: Space):
+    """Fails if the sources of the last solves decide alone: a second crack starts where nothing happened before."""
+    solver = DensitySolver(space, LAW)
+    gamma = run(space, solver, np.ones(space.n_nodes), *[(0.3 + 0.01 * i, 0.0) for i in range(5)])
+    gamma = solver.solve(history(space, 0.35, 0.1), gamma, TOLERANCE)
+    assert whole_residual(space, solver, history(space, 0.35, 0.1), gamma) <= 2 * TOLERANCE
+    born = space.at_gauss(gamma)[history(space, 0.0, 0.1) > 0]
+    assert born.max() < 0.1
+
+
+def test_a_solver_restored_from_its_memory_goes_on_with_the_same_bits(space: Space):
+    """Fails if a zone depends on more than its memory: a resumed run would differ from one that was not stopped."""
+    one, two = DensitySolver(space, LAW), DensitySolver(space, LAW)
+    gamma = run(space, one, np.ones(space.n_nodes), *PATH[:12])
+    two.restore({name: array.copy() for name, array in one.memory().items()})
+    np.testing.assert_array_equal(run(space, one, gamma, *PATH[12:]), run(space, two, gamma, *PATH[12:]))
+    assert two.zone.solves > 2
+
+
+def test_no_zone_for_the_consistent_sink(space: Space):
+    """Fails if the zone is used where its solver stalls."""
+    assert DensitySolver(space, LAW, "consistent").zone is None
