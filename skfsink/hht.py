@@ -85,6 +85,7 @@ class HHT:
         h = float(self.space.h.min())  # forces and displacements so small that rounding hides them
         self._rounding = 1e-9 * momentum.material.shear_modulus * h ** (self.space.dim - 1), 1e-9 * h
         self.rejected = self.iterations = 0
+        self._cut = False  # whether a step was cut because a crack ran through it
 
     def start(self, state: State) -> None:
         """Forces and masses of `state`; after a resume :meth:`restore` does it."""
@@ -178,9 +179,11 @@ class HHT:
             if balanced and correction <= c.correction_tolerance * increment and settled:
                 if dt > self._failing_step and float((state.gamma - gamma).max()) > 0.5:
                     # converged, but to a crack that has run through a single step
-                    log.warning("a step of %.3g s would let a crack run through at once: steps in which elements fail "
-                                "are cut to 0.1 l/c_s = %.3g s; --hht-dt at or below it spares the attempts", dt,
-                                self._failing_step)
+                    if not self._cut:
+                        log.warning("a step of %.3g s would let a crack run through at once: steps in which elements "
+                                    "fail are cut to 0.1 l/c_s = %.3g s; --hht-dt at or below it spares the attempts",
+                                    dt, self._failing_step)
+                        self._cut = True
                     return None, iteration
                 return _Trial(u, a, gamma, force, momentum.W, mass, self.inertia.places()), iteration
             if iteration == c.max_iterations:
