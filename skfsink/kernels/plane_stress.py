@@ -143,25 +143,29 @@ def tangent_plane_stress(space: Space, pattern: Pattern, material: Material, u: 
 
 
 @njit(fastmath=FAST)
-def _second(inv_j, y, p, s, dpsi, ddpsi, k_bulk, c):  # type: ignore[no-untyped-def]
+def _second(inv_j, y, p, s, dpsi, ddpsi, k_bulk, convex, c):  # type: ignore[no-untyped-def]
     """Derivatives of W(t, j) with lambda condensed out: rows W_t, W_j, W_tt, W_tj, W_jj of c.
 
     With x = log lambda and R = J^(-2/3), I = R (t + lambda^2) has I_t = R, I_j = -2/3 I/j,
     I_x = R (4/3 lambda^2 - 2/3 t), I_xx = R (4/9 t + 16/9 lambda^2); and W_tt - W_tx^2/W_xx is the condensed W_tt.
+    With `convex` the volumetric energy counts as linear in x where it is concave, J < 1/2.
     """
     for i in range(y.size):
         y2, ij = y[i] * y[i], inv_j[i]
-        R, J, lam = 1.0 / y2, y2 * y[i], y2 * y[i] * ij
+        R, J = 1.0 / y2, y2 * y[i]
         I, d1, d2, Ij = p[i] + s[i], dpsi[i], ddpsi[i], -2.0 / 3.0 * (p[i] + s[i]) * ij
         Ix, Ixx = 4.0 / 3.0 * s[i] - 2.0 / 3.0 * p[i], 16.0 / 9.0 * s[i] + 4.0 / 9.0 * p[i]
+        volumetric = 2.0 * J - 1.0 if J > 0.5 or not convex else 0.0  # of the second derivative with x
+        volumetric *= k_bulk * J
         Wtx = d2 * R * Ix - 2.0 / 3.0 * d1 * R
-        Wjx = d2 * Ij * Ix - 2.0 / 3.0 * d1 * Ix * ij + k_bulk * lam * (2.0 * J - 1.0)
-        Wxx = d2 * Ix * Ix + d1 * Ixx + k_bulk * J * (2.0 * J - 1.0)
+        Wjx = d2 * Ij * Ix - 2.0 / 3.0 * d1 * Ix * ij + ij * volumetric
+        Wxx = d2 * Ix * Ix + d1 * Ixx + volumetric
         c[0, i] = d1 * R
         c[1, i] = -2.0 * d1 * s[i] * ij
         c[2, i] = d2 * R * R - Wtx * Wtx / Wxx
         c[3, i] = d2 * R * Ij - 2.0 / 3.0 * d1 * R * ij - Wtx * Wjx / Wxx
-        c[4, i] = d2 * Ij * Ij + 10.0 / 9.0 * d1 * I * ij * ij + k_bulk * lam * lam - Wjx * Wjx / Wxx
+        c[4, i] = (d2 * Ij * Ij + (10.0 / 9.0 * d1 * I + volumetric - k_bulk * J * (J - 1.0)) * ij * ij
+                   - Wjx * Wjx / Wxx)
 
 
 _c = types.Array
@@ -176,7 +180,8 @@ def _tangent(law, constants, k_bulk, mu, conn, x, dN, w, gamma, convex, slot, da
 
         w gamma [2 W_t Grad N_a.Grad N_b I + W_j j'' + 4 W_tt n n^T + 2 W_tj (n c^T + c n^T) + W_jj c c^T].
 
-    The first two together are positive for |W_j| <= 2 W_t, to which `convex` bounds W_j; beyond, the sheet buckles.
+    The first two together are positive for |W_j| <= 2 W_t, to which `convex` bounds W_j: beyond, the sheet buckles.
+    It also leaves out the concave part that the volumetric energy has, in log J, at J < 1/2.
     """
     K, n, c = np.empty((8, 8)), np.empty((4, 8)), np.empty((4, 8))
     t, j, inv_j, y, p, s = np.empty(4), np.empty(4), np.empty(4), np.empty(4), np.empty(4), np.empty(4)
@@ -198,7 +203,7 @@ def _tangent(law, constants, k_bulk, mu, conn, x, dN, w, gamma, convex, slot, da
                 n[q, 2 * a], n[q, 2 * a + 1] = f0 * d0 + f1 * d1, f2 * d0 + f3 * d1
                 c[q, 2 * a], c[q, 2 * a + 1] = f3 * d0 - f2 * d1, f0 * d1 - f1 * d0
         _thin(law, constants, k_bulk, t, j, inv_j, y, p, s, I1, psi, dpsi, ddpsi)
-        _second(inv_j, y, p, s, dpsi, ddpsi, k_bulk, W)
+        _second(inv_j, y, p, s, dpsi, ddpsi, k_bulk, convex, W)
         for q in range(4):
             wg = w[e, q] * gamma[e, q]
             soft = w[e, q] * ERSATZ_STIFFNESS * mu if gamma[e, q] < SOFT_GAMMA else 0.0
@@ -278,7 +283,7 @@ def stiffness_plane_stress(law, constants, k_bulk, conn, x, geometry, gamma, inv
         _kinematics(z, geo, ws)
         _shift(t)
         _thin(law, constants, k_bulk, t, j, inv_j, y, p, s, I1, psi_q, dpsi, ddpsi)
-        _second(inv_j, y, p, s, dpsi, ddpsi, k_bulk, W)
+        _second(inv_j, y, p, s, dpsi, ddpsi, k_bulk, False, W)
         _stress(ws, geo, ab, t_stress)
         _nodal_force(t_stress, b)
         _try(conn[tile], inverse_mass, b, z, norm)
