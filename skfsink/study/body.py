@@ -1,0 +1,248 @@
+"""A body loaded to its onset once, from which the events of a study start; nothing is written to disk."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cache, cached_property
+from typing import Any
+
+import numpy as np
+
+from ..density import DensitySolver
+from ..energy import Ledger
+from ..errors import ConvergenceError, InstabilityError
+from ..explicit import Explicit, ExplicitControls
+from ..hht import HHT, HHTControls
+from ..material import AAA, Material, SinkLaw
+from ..momentum import Momentum
+from ..sample import Sample
+from ..scene import Grip, Scene
+from ..simulate import onset_copy
+from ..state import State
+from ..statics import Statics, StaticsControls
+from .meshes import load_plate
+
+__all__ = ["PULLED", "SLAB", "SPEED", "Body", "Front", "Integrator", "Make", "first_passages", "warm"]
+
+Integrator = Explicit | HHT
+Make = Callable[["Body"], Integrator]
+
+SPEED = 1e-3  # of a grip [mm/s]; it only sets the clock of the loading
+#: both ends of a plate move apart and are held sideways
+PULLED = (Grip("top", (0.0, SPEED)), Grip("bottom", (0.0, -SPEED)))
+#: the same for a slab of hexahedra whose faces are held in z: plane strain
+SLAB = (Grip("top", (0.0, SPEED, 0.0)), *(Grip(face, (None, None, 0.0)) for face in ("back", "front")),
+        Grip("bottom", (0.0, -SPEED, 0.0)))
+
+
+class _Exact(DensitySolver):
+    """Solves for gamma to the full tolerance every time."""
+
+    def solve(self, W_max: np.ndarray, gamma: np.ndarray, *_: Any, **__: Any) -> np.ndarray:
+        return super().solve(W_max, gamma)
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A notched plate between grips, and how it is modelled.
+
+    Parameters
+    ----------
+    sample: the plate; its boundary `notch` ends at the tip, and the crack runs on in x.
+    grips: what moves it.   parts: how many bodies like this make the whole plate, 2 for a half.
+    material, law: stored energy and sink.
+    sink, element, force_floor, deletion, overshoot: as those of :class:`.Controls`.
+    exact: solve for gamma to the full tolerance in every step, for references.
+    onset_tolerance: width of the last interval of the bisection for the onset, relative to the load.
+    """
+
+    sample: Sample
+    grips: tuple[Grip, ...] = PULLED
+    parts: int = 1
+    material: Material = field(default_factory=AAA)
+    law: SinkLaw = field(default_factory=SinkLaw)
+    sink: str = "lumped"
+    element: str = "jbar"
+    force_floor: float = 1e-3
+    deletion: float = 1e-6
+    overshoot: float = 0.005
+    exact: bool = False
+    onset_tolerance: float = 5e-4
+
+    @cached_property
+    def scene(self) -> Scene:
+        """The body as a scene, which knows what is held."""
+        return Scene("study", "study", {}, self.sample, self.material, self.law, self.grips)
+
+    @cached_property
+    def constraints(self) -> tuple[np.ndarray, np.ndarray]:
+        """Free degrees of freedom (n*dim,), velocity of the held ones (n, dim)."""
+        return self.scene.constraints()
+
+    @cached_property
+    def momentum(self) -> Momentum:
+        """The displacement field."""
+        return Momentum(self.sample.space, self.material, self.element, self.force_floor)
+
+    @cached_property
+    def density(self) -> DensitySolver:
+        """The relative density."""
+        return (_Exact if self.exact else DensitySolver)(self.sample.space, self.law, self.sink)
+
+    def held_at(self, opening: float) -> dict[str, float]:
+        """:meth:`figures` of the intact plate in equilibrium at an opening of the grips [mm]."""
+        state, statics = State.intact(self.sample.space), self.statics()
+        state.grip = opening / (2 * SPEED)
+        self.momentum.set_gamma(state.gamma, state.deleted)
+        move = self.constraints[1] * state.grip
+        state.u, _ = statics.newton.equilibrium(statics.newton.predict(state.u, move))
+        statics.newton.release()
+        return self.figures(state)
+
+    def statics(self) -> Statics:
+        """A new solver of equilibria."""
+        return Statics(self.momentum, self.density, *self.constraints,
+                       StaticsControls(onset_tolerance=self.onset_tolerance), self.deletion)
+
+    def figures(self, state: State) -> dict[str, float]:
+        """Opening of the grips [mm], force on the first [N/mm], elastic energy [N mm/mm] of the whole plate."""
+        self.momentum.set_gamma(state.gamma, state.deleted)
+        force = self.momentum.force(state.u)
+        grip = self.grips[0]
+        along = np.array([v or 0.0 for v in grip.velocity]) / SPEED
+        reaction = float((force[self.sample.nodes(grip.boundary)] @ along).sum())
+        thickness = self.thickness
+        return {"opening_mm": state.grip * 2 * SPEED, "reaction_N_per_mm": reaction / thickness,
+                "elastic_N": self.momentum.energy * self.parts / thickness}
+
+    @property
+    def thickness(self) -> float:
+        """Thickness of a slab [mm], 1 in plane strain: figures are those for a unit of it."""
+        X = self.sample.space.X
+        return float(np.ptp(X[:, 2])) if X.shape[1] == 3 else 1.0
+
+    @cached_property
+    def _loaded(self) -> tuple[State, dict[str, float]]:
+        state = State.intact(self.sample.space)
+        cpu = time.process_time()
+        for _ in self.statics().load(state):
+            pass
+        cpu = time.process_time() - cpu
+        return state, {**self.figures(state), "gamma_min": float(state.gamma.min()), "loading_cpu_s": cpu}
+
+    @property
+    def onset(self) -> State:
+        """A copy of the state at the onset, found once."""
+        return onset_copy(self._loaded[0])
+
+    @property
+    def onset_figures(self) -> dict[str, float]:
+        """:meth:`figures` at the onset, with the least gamma and the processor time of the loading."""
+        return self._loaded[1]
+
+    def explicit(self, controls: ExplicitControls) -> Explicit:
+        """The explicit integrator of this body."""
+        return Explicit(self.momentum, self.density, *self.constraints, controls, self.deletion)
+
+    def hht(self, controls: HHTControls) -> HHT:
+        """The implicit integrator of this body."""
+        return HHT(self.momentum, self.density, *self.constraints, controls, self.deletion)
+
+    def event(self, make: Make, run: float = 1.0, places: int = 20, limit: float = 1.5e-4) -> dict[str, Any]:
+        """Let the crack run from just past the onset until its tip has gone `run` [mm].
+
+        Returns
+        -------
+        `arrival_us`: when the tip passed +`run`, interpolated within the step.   `passed_us`: when it passed each of
+        `places` equal parts of the way.   `D`, `U`: energies at the arrival [N mm/mm].   `steps`, `dt_us`: number and
+        mean size of steps.   `cpu_s`: processor time of the integration alone.
+
+        Raises
+        ------
+        ConvergenceError
+            The crack has not gone that far after `limit` [s], or the integrator gives up.
+        InstabilityError
+            The ledger is open, or energy was fed in, by more than 5 % of that of the onset.
+        """
+        state = self.onset
+        state.u *= 1 + self.overshoot
+        state.grip *= 1 + self.overshoot
+        state.time, state.step, state.phase, state.ledger = 0.0, 0, "event", Ledger()
+        integrator = make(self)
+        front = Front(self.sample)
+        integrator.begin(state)
+        marks = np.linspace(0, run, places + 1)[1:]
+        track = [(0.0, 0.0, 0.0, 0.0)]
+        steps = integrator.run(state, limit)
+        cpu, seen = 0.0, state.gamma
+        while track[-1][1] < run:
+            before = time.process_time()
+            done = next(steps, None)
+            cpu += time.process_time() - before
+            if done is None:
+                raise ConvergenceError(f"the crack has run {track[-1][1]:.2f} mm of {run:g} mm in {limit * 1e6:g} µs")
+            if state.gamma is not seen:
+                seen = state.gamma
+                way = max(front.tip(seen), track[-1][1])
+                track.append((state.time, way, state.ledger.sink, state.ledger.paper))
+                self._guard(state)
+        times, way, sink, paper = np.array(track).T
+        passed = first_passages(times, way, marks)
+        scale = self.parts / self.thickness
+        return {"arrival_us": passed[-1] * 1e6, "passed_us": passed * 1e6,
+                "D": float(np.interp(passed[-1], times, sink)) * scale, "U": paper[-1] * scale, "steps": state.step,
+                "dt_us": state.time / state.step * 1e6, "cpu_s": cpu}
+
+    def _guard(self, state: State) -> None:
+        ledger = state.ledger
+        worst = max(ledger.error(ledger.initial), -ledger.numerical / ledger.initial)
+        if not worst <= 0.05:
+            raise InstabilityError(f"the ledger is open, or energy was fed in, by {worst:.2%} of that of the onset at "
+                                   f"{state.time * 1e6:.2f} µs")
+
+
+class Front:
+    """How far a crack has come: the farthest point in x of the line gamma = 0.1, from the tip of the notch [mm]."""
+
+    GAMMA = 0.1
+
+    def __init__(self, sample: Sample) -> None:
+        space = sample.space
+        X, notch = space.X, sample.nodes("notch")
+        self._tip = float(X[notch, 0].max())
+        rows = np.repeat(np.arange(space.n_nodes), np.diff(space.graph.indptr))
+        cols = space.graph.indices
+        # not where a crack may start at the grips
+        near = abs(X[:, 1] - X[notch[np.argmax(X[notch, 0])], 1]) < 0.3 * float(np.ptp(X[:, 0]))
+        keep = (rows < cols) & near[rows] & near[cols]
+        self._a, self._b, self._x = rows[keep], cols[keep], X[:, 0]
+
+    def tip(self, gamma: np.ndarray) -> float:
+        """Its distance for the nodal values `gamma` (n,), linear along the lines between nodes of an element."""
+        low, high = gamma[self._a], gamma[self._b]
+        cut = (low < self.GAMMA) != (high < self.GAMMA)
+        if not cut.any():
+            return 0.0
+        a, b, low, high = self._a[cut], self._b[cut], low[cut], high[cut]
+        part = (self.GAMMA - low) / (high - low)
+        return max(0.0, float((self._x[a] + part * (self._x[b] - self._x[a])).max()) - self._tip)
+
+
+def first_passages(times: Sequence[float] | np.ndarray, way: np.ndarray, marks: np.ndarray) -> np.ndarray:
+    """When a way that never falls first reached each of `marks`, linear within a step; it must reach them all."""
+    after = np.searchsorted(way, marks, side="left")
+    t, x = np.asarray(times), np.asarray(way)
+    before = np.maximum(after - 1, 0)
+    rise = np.where(after > 0, x[after] - x[before], 1.0)
+    return np.where(after > 0, t[before] + (marks - x[before]) / rise * (t[after] - t[before]), t[0])
+
+
+@cache
+def warm(dim: int) -> None:
+    """Compile or load all that runs need, so that the first one that is measured is not charged for it."""
+    body = Body(load_plate("plate0", slab=None if dim == 2 else (0.05, 1)), PULLED if dim == 2 else SLAB)
+    body.event(lambda body: body.explicit(ExplicitControls()), run=0.05)
+    if dim == 2:
+        body.event(lambda body: body.hht(HHTControls()), run=0.05)

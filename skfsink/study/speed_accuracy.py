@@ -1,0 +1,92 @@
+"""Work-precision study: error against processor time, one point a method, its Pareto front drawn and named.
+
+`python -m skfsink.study.speed_accuracy` writes `speed_accuracy.json` and a picture a part. It goes on where it was
+stopped; `--quick` takes fewer points and less than three minutes.
+"""
+
+# ruff: noqa: E402
+
+from __future__ import annotations
+
+import os
+
+for _name in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from cyclopts import Parameter
+
+from ..progress import Display
+from ..simulate import Interrupted
+from .integrators import TIME
+from .models import MODEL
+from .part import Part, Points
+from .refinement import SPACE
+from .store import Store
+
+__all__ = ["PARTS", "run_parts", "speed_accuracy"]
+
+PARTS: dict[str, Part] = {part.name: part for part in (TIME, SPACE, MODEL)}
+FLAG = Parameter(negative="", show_default=False)
+
+
+def speed_accuracy(*, only: Literal["time", "space", "model", "solvers"] | None = None,
+                   quick: Annotated[bool, FLAG] = False, fresh: Annotated[bool, FLAG] = False,
+                   out: Path = Path("results/study/speed_accuracy"), quiet: Annotated[bool, FLAG] = False) -> None:
+    """Measure what each method costs and how far it is off, and chart one against the other.
+
+    Parameters
+    ----------
+    only
+        One part of the study: integrators, meshes and elements, the model, or linear solvers.
+    quick
+        Fewer points, in less than three minutes.
+    fresh
+        Measure all points anew; without it, those in the folder are kept.
+    out
+        Folder for the figures and pictures.
+    quiet
+        Show no progress.
+    """
+    store = Store(out / "speed_accuracy.json", "speed_accuracy", fresh)
+    with Display(quiet) as display:
+        run_parts(store, [PARTS[only]] if only else list(PARTS.values()), quick, display)
+
+
+def run_parts(store: Store, parts: list[Part], quick: bool, display: Display) -> None:
+    """Compute the points of `parts` that `store` does not have, and draw each part beside its file.
+
+    Raises
+    ------
+    Interrupted
+        Ctrl-C or SIGTERM; the points so far are in the file.
+    """
+    folder = store.path.parent
+    for part in parts:
+        display.phase(part.name)
+        planned = part.plan(quick)
+        points: Points = {}
+        todo = sum(p.seconds for p in planned if f"{part.name}/{p.key}" not in store.points)
+        done = 0.0
+        try:
+            for p in planned:
+                key = f"{part.name}/{p.key}"
+                new = key not in store.points
+                display.update(done / todo if todo else 1.0, p.key)
+                points[p.key] = store.point(key, p.compute)
+                done += p.seconds if new else 0.0
+                if new and "failed" in points[p.key]:
+                    display.say(f"{p.key} failed: {points[p.key]['failed']}")
+        except KeyboardInterrupt:
+            raise Interrupted(f"interrupted; {len(store.points)} points are in {store.path}, and the same command goes "
+                              f"on from there") from None
+        part.draw(points, folder / f"{store.study}_{part.name}.png")
+        display.update(1.0, "")
+
+
+if __name__ == "__main__":
+    from ..cli import command
+
+    command(speed_accuracy, package="study")
