@@ -84,7 +84,7 @@ def test_step_follows_the_deformed_state():
         momentum, density = Momentum(space, AAA()), DensitySolver(space, SinkLaw(phi=1e6))
         state = State.intact(space)
         state.u = space.X * (np.array([1 / stretch, stretch]) - 1)
-        explicit = Explicit(momentum, density, free, still)
+        explicit = Explicit(momentum, density, free, still, ExplicitControls(gamma_every=1))
         explicit.begin(state)
         explicit.step(state)
         steps.append(explicit.dt)
