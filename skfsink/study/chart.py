@@ -19,13 +19,14 @@ __all__ = ["draw_front", "page"]
 
 
 @contextmanager
-def page(path: str | Path, title: str, rows: int, columns: int, height: float) -> Iterator[list[Axes]]:
-    """A page with a grid of axes, `height` [in] tall; it is written to `path` (PNG) when the block has filled it.
+def page(path: str | Path, title: str, rows: int, columns: int, height: float,
+         width: float = WIDTH) -> Iterator[list[Axes]]:
+    """A page with a grid of axes, `height` by `width` [in]; it is written to `path` (PNG) when the block has filled it.
 
     The axes come row by row.
     """
     with matplotlib.rc_context(STYLE):
-        figure = Figure((WIDTH, height), layout="constrained")
+        figure = Figure((width, height), layout="constrained")
         axes: list[Axes] = figure.subplots(rows, columns, squeeze=False).ravel().tolist()
         yield axes
         figure.suptitle(title)
