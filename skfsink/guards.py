@@ -76,10 +76,10 @@ class Guard:
     """
 
     LOCKS = 50.0           # k/mu past which the plain element is warned of
-    STIFF = 1e6            # k/mu past which rounding reaches the equilibria
+    STIFF = 2e4            # k/mu past which rounding comes near the equilibria
     COARSE = 1.2           # l/h below which the mesh decides where and when it cracks
     SHARP = 60.0           # degrees by which a notch may turn at one node
-    CHECKERED = 0.05       # energy of an alternating pressure, of the energy limiter
+    CHECKERED = 0.1        # amplitude of an alternating pressure, of mu
     FLAT = 0.2             # J below which a live point is close to being turned inside out
     LIVE = 0.5             # gamma of a point that must not be inside out
     NEGATIVE = -1e-6       # gamma below which a nodal density is no rounding
@@ -112,9 +112,9 @@ class Guard:
             log.warning("the plain element locks at k/mu = %.4g (above %g): stiffness, onset load and U come out too "
                         "high; take --element jbar", ratio, self.LOCKS)
         if ratio > self.STIFF and self.scene.controls.element != "planestress":
-            log.warning("k/mu = %.3g is so large (above %g) that rounding reaches the equilibria and the explicit step "
-                        "falls with its root; at --bulk-modulus %.3g the solid is as good as incompressible", ratio,
-                        self.STIFF, 1e3 * material.shear_modulus)
+            log.warning("k/mu = %.3g is so large (above %g) that rounding comes near the tolerance of equilibria, and "
+                        "the explicit step falls with its root; with --bulk-modulus %.3g the solid is as good as "
+                        "incompressible", ratio, self.STIFF, 1e3 * material.shear_modulus)
         h = float(space.h.min())
         if h > l / self.COARSE:
             log.warning("no element is finer than h = %.3g mm, l/h = %.2f (less than %g): onset and U are those of the "
@@ -141,11 +141,10 @@ class Guard:
                         "onset and U are those of the mesh; refine it there to h <= l/3, or raise --length-scale",
                         _place(space.X[weakest]), h, l / h, self.COARSE)
         amplitude = indicators.alternation(space, indicators.element_pressure(space, state.u, k))
-        share = amplitude**2 / (2 * k) / self.scene.sink_law.phi
-        if share > self.CHECKERED and self.scene.controls.element == "jbar":
-            log.warning("pressures of neighbouring elements alternate by %.3g MPa (checkerboard), which is %.2g of the "
-                        "energy limiter (above %g): break up the rows of the mesh, or lower --bulk-modulus", amplitude,
-                        share, self.CHECKERED)
+        if self.scene.controls.element == "jbar" and amplitude > self.CHECKERED * self.scene.material.shear_modulus:
+            log.warning("pressures of neighbouring elements alternate by %.3g MPa (above %g mu): a checkerboard, with "
+                        "%.2g of the energy limiter; break up the rows of the mesh, or lower --bulk-modulus", amplitude,
+                        self.CHECKERED, amplitude**2 / (2 * k) / self.scene.sink_law.phi)
         error, allowed = state.ledger.error(state.ledger.elastic), self.scene.controls.balance_tolerance
         if not error <= allowed:
             raise InstabilityError(f"the ledger of the loading is open by {error:.2%} of the stored energy, allowed "

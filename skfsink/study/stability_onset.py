@@ -1,0 +1,197 @@
+"""Where the onset and the crack depend on the iteration or the mesh: staggering, sweeps, notch, l/h."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from ..energy import Ledger
+from ..errors import ConvergenceError
+from ..explicit import ExplicitControls
+from ..plot import BLUE, RED, SAND
+from ..state import State
+from ..statics import Statics, StaticsControls
+from .blocks import block
+from .body import Body
+from .part import Planned, Points
+
+__all__ = ["draw_length", "draw_notch", "draw_staggering", "draw_sweeps", "length", "notch", "passes", "plan_length",
+           "plan_notch", "plan_staggering", "plan_sweeps", "staggering", "sweeps"]
+
+
+def _plate() -> Body:
+    return Body(block(15, notch=0.4, width=0.06))
+
+
+def _statics(body: Body, **controls: Any) -> Statics:
+    return Statics(body.momentum, body.density, *body.constraints, StaticsControls(**controls))
+
+
+# --- the iterated staggering ---
+def staggering() -> dict[str, Any]:
+    """Factor a pass by which the change of gamma falls, and least gamma, as the load nears the onset."""
+    body = _plate()
+    statics, state = _statics(body, onset_tolerance=1e-6, max_passes=2000), State.intact(body.sample.space)
+    load, factor, least = [], [], []
+    for _ in statics.load(state):
+        load.append(state.grip)
+        factor.append(statics.factor)
+        least.append(float(state.gamma.min()))
+    return {"load": np.array(load) / load[-1], "factor": factor, "least": least}
+
+
+def passes(most: int) -> dict[str, Any]:
+    """Opening at the onset [mm] that is found when an increment is given up after `most` passes, and the reason."""
+    body = _plate()
+    statics, state = _statics(body, max_passes=most), State.intact(body.sample.space)
+    for _ in statics.load(state):
+        pass
+    return {"passes": most, "opening": state.grip * 2e-3, "refused": statics.refused, "newton": statics.newton_steps}
+
+
+def plan_staggering(quick: bool) -> list[Planned]:
+    most = (5, 80) if quick else (3, 5, 8, 12, 20, 40, 80)
+    return [Planned("approach", staggering, 8.0)] + [Planned(f"{k} passes", partial(passes, k), 2.0) for k in most]
+
+
+def draw_staggering(axes: Sequence[Axes], points: Points) -> None:
+    found = points["approach"]
+    distance = 1 - np.array(found["load"][:-1])
+    axes[0].plot(distance, found["factor"][:-1], "o-", color=BLUE, markersize=3, fillstyle="none",
+                 label="factor a pass")
+    axes[0].plot(distance, found["least"][:-1], "s--", color=SAND, markersize=3, fillstyle="none",
+                 label=r"least $\gamma$")
+    axes[0].set(xscale="log", xlabel="distance to the onset, 1 - load / onset load", ylim=(0, 1.05),
+                ylabel=r"factor of $\max|\Delta\gamma|$ a pass", title="Staggering stalls at the onset")
+    axes[0].invert_xaxis()
+    axes[0].legend(loc="lower right")
+    mine = [p for p in points.values() if "passes" in p]
+    right = mine[-1]["opening"]
+    for reason, colour, style, name in (("passes", RED, "s", "given up: warning"),
+                                        ("runs away", BLUE, "o", "runs away")):
+        some = [p for p in mine if p["refused"] == reason]
+        axes[1].plot([p["passes"] for p in some], [p["opening"] / right for p in some], style, color=colour,
+                     markersize=4, fillstyle="none", label=name)
+    axes[1].set(xscale="log", xlabel="passes allowed in an increment", ylabel="onset found / onset",
+                title="an onset that is found too early")
+    axes[1].legend()
+
+
+# --- sweeps on states that are not in equilibrium ---
+def sweeps(steps: int, searched: bool, most: int = 60) -> dict[str, Any]:
+    """Mass lost in quasi-static sweeps of which each makes `steps` Newton steps only; 0 goes on to the equilibrium.
+
+    The history follows what these leave. Steps are full ones, or `searched` along their direction for less energy, as
+    a run does. It ends when less than 1e-4 of the energy is left.
+    """
+    body = _plate()
+    state = body.onset
+    state.u *= 1.005
+    state.grip *= 1.005
+    state.time, state.step, state.phase, state.ledger = 0.0, 0, "event", Ledger()
+    statics = _statics(body, front=0.0)
+    if steps:
+        statics._relax = partial(_unconverged, statics, steps, searched)  # type: ignore[method-assign]
+    failed, error = [], ""
+    try:
+        for _ in statics.propagate(state):
+            failed.append(int(state.deleted.sum()))
+            if state.step >= most or state.ledger.elastic < 1e-4 * state.ledger.initial:
+                break
+    except ConvergenceError as reason:
+        error = str(reason)
+    lost = 1 - float(body.density.load @ state.gamma) / float(body.density.load.sum())
+    return {"steps": steps, "searched": searched, "deleted": float(state.deleted.mean()), "sweeps": len(failed),
+            "most": int(np.diff([0, *failed]).max()), "lost": lost, "error": error}
+
+
+def _unconverged(statics: Statics, steps: int, searched: bool, state: State) -> np.ndarray:
+    """Displacement after a few Newton steps from that of `state`."""
+    newton, u = statics.newton, state.u.copy()
+    for _ in range(steps):
+        r = statics.momentum.force(u).ravel()[newton.free]
+        energy, d = statics.momentum.energy, np.zeros(u.size)
+        newton._kept = None
+        d[newton.free], _ = newton._direction(u, r)
+        step, length = d.reshape(u.shape), 1.0
+        if searched:
+            length, _ = newton._search(u, step, float(r @ d[newton.free]), energy, newton.LEAST_J)
+        u = u + length * step
+    statics.momentum.force(u)
+    return u
+
+
+def plan_sweeps(quick: bool) -> list[Planned]:
+    counts = (1, 0) if quick else (1, 2, 3, 4, 6, 8, 10, 0)
+    return [Planned(f"{k or 'all'} steps, {'searched' if searched else 'full'}", partial(sweeps, k, searched), 1.0)
+            for searched in (False, True) for k in counts if k or searched]
+
+
+def draw_sweeps(axes: Sequence[Axes], points: Points) -> None:
+    ax = axes[0]
+    for searched, style, colour, name in ((False, "s--", RED, "full steps"), (True, "o-", BLUE, "with line search")):
+        mine = [p for p in points.values() if p["searched"] == searched and p["steps"]]
+        ax.plot([p["steps"] for p in mine], [100 * p["lost"] for p in mine], style, color=colour, markersize=3.5,
+                fillstyle="none", label=name)
+    converged = next(p for p in points.values() if p["steps"] == 0)
+    ax.axhline(100 * converged["lost"], color="0.4", linewidth=0.8, linestyle=":", label="equilibria")
+    ax.set(xlabel="Newton steps in a sweep", ylim=(0, 105), ylabel="mass lost (%)",
+           title="Sweeps on states that are no equilibria")
+    ax.legend()
+
+
+# --- the notch and the length scale ---
+def notch(n: int, width: float) -> dict[str, Any]:
+    """Opening and force at the onset of a block of n x n elements with a notch of 0.4 mm of this width [mm]."""
+    return {"n": n, "width": width, "h": 1 / n, **Body(block(n, notch=0.4, width=width)).onset_figures}
+
+
+def plan_notch(quick: bool) -> list[Planned]:
+    even, odd = ((10, 20, 40), (10, 30)) if quick else ((10, 20, 30, 40, 60, 80), (10, 30, 50, 70))
+    return [Planned(f"width {width:g}, n {n}", partial(notch, n, width), 1e-3 * n**2)
+            for width, sizes in ((0.0, even), (0.1, odd), (0.2, even)) for n in sizes]
+
+
+def draw_notch(axes: Sequence[Axes], points: Points) -> None:
+    ax = axes[0]
+    for width, style, colour, name in ((0.0, "s--", RED, "slit"), (0.1, "^-", SAND, "$l$ wide, square"),
+                                       (0.2, "o-", BLUE, "$2l$ wide, square")):
+        mine = [p for p in points.values() if p["width"] == width]
+        ax.plot([1e3 * p["h"] for p in mine], [p["opening_mm"] for p in mine], style, color=colour,
+                markersize=3.5, fillstyle="none", label=name)
+    ax.set(xscale="log", xlabel="element size $h$ (µm)", ylabel="opening at the onset (mm)", ylim=(0, None),
+           title="A notch finer than the mesh")
+    ax.set_xticks([12.5, 25, 50, 100], ["12.5", "25", "50", "100"])
+    ax.minorticks_off()
+    ax.legend()
+
+
+def length(per_length: float, n: int) -> dict[str, Any]:
+    """Onset of a block with a notch of 0.2 x 0.2 mm, and U and D when its crack has run 0.4 mm, at l/h."""
+    body = Body(block(n, notch=0.2, width=0.2))
+    found = {"l_over_h": per_length, "n": n, **body.onset_figures}
+    run = body.event(lambda b: b.explicit(ExplicitControls()), run=0.4, limit=8e-5)
+    return {**found, "U": run["U"], "D": run["D"], "arrival_us": run["arrival_us"], "steps": run["steps"]}
+
+
+def plan_length(quick: bool) -> list[Planned]:
+    sizes = (5, 15, 30) if quick else (5, 10, 15, 20, 25, 30, 40, 50)
+    return [Planned(f"l/h {n / 10:g}", partial(length, n / 10, n), 1e-2 * n**2) for n in sizes]
+
+
+def draw_length(axes: Sequence[Axes], points: Points) -> None:
+    mine = list(points.values())
+    done = [p for p in mine if "U" in p]
+    finest = done[-1]
+    axes[0].axvspan(0, 1.2, color="#f6e3e1")
+    for key, style, colour, name in (("opening_mm", "o-", BLUE, "opening at the onset"), ("U", "s--", RED, "$U$"),
+                                     ("D", "^-", SAND, "$D$")):
+        axes[0].plot([p["l_over_h"] for p in done], [p[key] / finest[key] for p in done], style, color=colour,
+                     markersize=3.5, fillstyle="none", label=name)
+    axes[0].set(xlabel="$l/h$", xlim=(0.3, None), ylabel="of that of the finest mesh", ylim=(0, None),
+                title="Elements coarse for $l$")
+    axes[0].legend()
