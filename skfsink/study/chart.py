@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from ..output import replaced
 from ..plot import DPI, STYLE, WIDTH
@@ -29,9 +31,32 @@ def page(path: str | Path, title: str, rows: int, columns: int, height: float,
         figure = Figure((width, height), layout="constrained")
         axes: list[Axes] = figure.subplots(rows, columns, squeeze=False).ravel().tolist()
         yield axes
+        for ax in axes:
+            plain_ticks(ax)
         figure.suptitle(title)
         with replaced(path) as part:
             figure.savefig(part, format="png", dpi=DPI)
+
+
+def plain_ticks(ax: Axes) -> None:
+    """Plain numbers on logarithmic axes: the decades, and 2 and 5 in between where there are fewer than two of them."""
+    for axis in (ax.xaxis, ax.yaxis):
+        if axis.get_scale() != "log":
+            continue
+        low, high = sorted(axis.get_view_interval())
+        wide = bool(high > 60 * low)
+        axis.set_major_locator(LogLocator(10, (1.0,) if wide else (1.0, 2.0, 5.0) if high > 3 * low else range(1, 10)))
+        axis.set_major_formatter(FuncFormatter(partial(_number, wide)))
+        axis.set_minor_formatter(NullFormatter())
+
+
+def _number(decades: bool, value: float, _: int) -> str:
+    """A number, a power of ten where it would be long."""
+    if 9e-4 < value < 1.1e4:
+        return f"{value:g}"
+    power = int(np.floor(np.log10(value) + 1e-9))
+    front = "" if decades else f"{value / 10**power:.0f}" + r"\cdot"
+    return f"${front}10^{{{power}}}$"
 
 
 def draw_front(ax: Axes, cost: Sequence[float], error: Sequence[float], names: Sequence[str],

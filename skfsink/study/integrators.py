@@ -139,7 +139,7 @@ def draw(points: Points, path: Path) -> None:
     with page(path, "Error against cost of the integrators: crack runs 1 mm", 1, 3, 4.6) as axes:
         for ax, (name, label) in zip(axes, ERRORS.items()):
             panel(ax, rows, name)
-            ax.set(xlabel="processor time (s)", ylabel=f"relative error of the {label}")
+            ax.set_ylabel(f"relative error of the {label}")
 
 
 #: colour and marker of each family, by line
@@ -167,7 +167,8 @@ def panel(ax: Axes, rows: list[dict[str, Any]], measure: str) -> None:
     last = [row for row in rows if row["family"] == "reference"][-1]
     ax.axhspan(1e-9, last[measure], color="0.9", zorder=0, label="uncertainty of the reference")
     values = [row[measure] for row in good]
-    ax.set(xscale="log", yscale="log", ylim=(0.5 * min(last[measure], *values), 2 * max(values)))
+    ax.set(xscale="log", yscale="log", ylim=(0.5 * min(last[measure], *values), 2 * max(values)),
+           xlabel="processor time (s)")
     draw_front(ax, [row["cost"] for row in good], values, [row["name"] for row in good])
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import meshio
+from matplotlib.axes import Axes
 
 from ..sample import Sample, load_sample
 from ..sweeping import swept
@@ -101,8 +102,8 @@ def limits(points: Points) -> dict[str, tuple[float, float]]:
 
 
 def _family(points: Points, element: str, kind: str, unstructured: bool = False) -> list[dict[str, Any]]:
-    chosen = [p for key, p in points.items() if key.split("/")[-2:] == [element, kind] and "failed" not in p
-              and key.startswith("M") == unstructured]
+    chosen = [{"mesh": key.rsplit("/", 2)[0], **p} for key, p in points.items()
+              if key.endswith(f"/{element}/{kind}") and key.startswith("M") == unstructured and "failed" not in p]
     return sorted(chosen, key=lambda p: -p["h_mm"])
 
 
@@ -117,29 +118,41 @@ LINES = (("jbar", "quads", False, "#33658a", "o-", "J̄, divided"),
 
 def draw(points: Points, path: Path) -> None:
     """Above, errors against the element size with their rates; below, against the cost of loading to the onset."""
-    found = limits(points)
-    shown = ("reaction", "onset opening", "onset energy")
-    with page(path, "Error of elements and meshes", 2, 3, 6.8) as axes:
+    found, shown = limits(points), ("reaction", "onset opening", "onset energy")
+    with page(path, "Error of elements and meshes", 2, 3, 7.0) as axes:
         for column, quantity in enumerate(shown):
-            by_size, by_cost = axes[column], axes[column + 3]
-            cost, error, names = [], [], []
+            ax = axes[column]
             for element, kind, unstructured, colour, style, name in LINES:
-                family = _family(points, element, kind, unstructured)
-                if not family:
-                    continue
-                h = [p["h_mm"] for p in family]
-                e = [abs(value(p, quantity) / found[quantity][0] - 1) for p in family]
-                rate = f" (rate {observed_rate(h, e):.1f})" if len(h) > 2 and not unstructured else ""
-                by_size.plot(h, e, style, ms=3.5, color=colour, label=name + rate)
-                by_cost.plot([p["cpu_s"] for p in family], e, style, ms=3.5, color=colour)
-                cost += [p["cpu_s"] for p in family]
-                error += e
-                names += [f"{name.split(',')[0]}, {kind}, l/{0.1 / p['h_mm']:.1f}" for p in family]
-            by_size.set(xscale="log", yscale="log", xlabel="element size $h$ (mm)",
-                        ylabel=f"relative error of the\n{QUANTITIES[quantity][2]}")
-            by_size.legend(fontsize=5.5)
-            by_cost.set(xscale="log", yscale="log", xlabel="processor time of the loading (s)", ylabel="relative error")
-            draw_front(by_cost, cost, error, names)
+                if family := _family(points, element, kind, unstructured):
+                    h, error = [p["h_mm"] for p in family], errors(family, quantity, found)
+                    rate = f" (rate {observed_rate(h, error):.1f})" if len(h) > 2 and not unstructured else ""
+                    ax.plot(h, error, style, ms=3.5, color=colour, label=name + rate)
+            ax.set(xscale="log", yscale="log", xlabel="element size $h$ (mm)",
+                   ylabel=f"relative error of the\n{QUANTITIES[quantity][2]}")
+            ax.legend(fontsize=5.5)
+            panel(axes[column + 3], points, quantity)
+
+
+def panel(ax: Axes, points: Points, quantity: str) -> None:
+    """Errors of a quantity against the cost of loading to the onset, with the Pareto front."""
+    found = limits(points)
+    cost: list[float] = []
+    error: list[float] = []
+    names: list[str] = []
+    for element, kind, unstructured, colour, style, name in LINES:
+        if family := _family(points, element, kind, unstructured):
+            seconds, e = [p["cpu_s"] for p in family], errors(family, quantity, found)
+            ax.plot(seconds, e, style, ms=3.5, color=colour, label=name)
+            cost, error = cost + seconds, error + e
+            names += [f"{name.split(',')[0]}, {kind}, {p['mesh']} (l/{0.1 / p['h_mm']:.1f})" for p in family]
+    ax.set(xscale="log", yscale="log", xlabel="processor time of the loading (s)",
+           ylabel=f"relative error of the\n{QUANTITIES[quantity][2]}")
+    draw_front(ax, cost, error, names)
+
+
+def errors(family: list[dict[str, Any]], quantity: str, found: dict[str, tuple[float, float]]) -> list[float]:
+    """Relative errors of a quantity against the limits."""
+    return [abs(value(p, quantity) / found[quantity][0] - 1) for p in family]
 
 
 def table(points: Points) -> list[str]:
@@ -157,8 +170,7 @@ def table(points: Points) -> list[str]:
         if len(family) > 2 and not unstructured:
             h = [p["h_mm"] for p in family]
             lines.append(f"| rate of {name}, {kind} | | | " + " | ".join(
-                f"{observed_rate(h, [abs(value(p, q) / found[q][0] - 1) for p in family]):.2f}"
-                for q in QUANTITIES) + " |")
+                f"{observed_rate(h, errors(family, q, found)):.2f}" for q in QUANTITIES) + " |")
     return lines
 
 

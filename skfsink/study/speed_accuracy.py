@@ -18,17 +18,21 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
+from ..output import write_atomic
 from ..progress import Display
 from ..simulate import Interrupted
+from . import integrators, refinement
+from .chart import page
 from .integrators import TIME
 from .models import MODEL
 from .part import Part, Points
 from .refinement import SPACE
+from .solvers import SOLVERS
 from .store import Store
 
 __all__ = ["PARTS", "run_parts", "speed_accuracy"]
 
-PARTS: dict[str, Part] = {part.name: part for part in (TIME, SPACE, MODEL)}
+PARTS: dict[str, Part] = {part.name: part for part in (TIME, SPACE, MODEL, SOLVERS)}
 FLAG = Parameter(negative="", show_default=False)
 
 
@@ -64,6 +68,7 @@ def run_parts(store: Store, parts: list[Part], quick: bool, display: Display) ->
         Ctrl-C or SIGTERM; the points so far are in the file.
     """
     folder = store.path.parent
+    found: dict[str, Points] = {}
     for part in parts:
         display.phase(part.name)
         planned = part.plan(quick)
@@ -82,8 +87,24 @@ def run_parts(store: Store, parts: list[Part], quick: bool, display: Display) ->
         except KeyboardInterrupt:
             raise Interrupted(f"interrupted; {len(store.points)} points are in {store.path}, and the same command goes "
                               f"on from there") from None
+        found[part.name] = points
         part.draw(points, folder / f"{store.study}_{part.name}.png")
         display.update(1.0, "")
+    if {"time", "space"} <= found.keys():
+        draw_headline(found["time"], found["space"], folder / f"{store.study}.png")
+    tables = [f"## {part.name}\n\n" + "\n".join(part.table(found[part.name])) + "\n" for part in parts]
+    write_atomic(folder / f"{store.study}.md", "\n".join(tables))
+
+
+def draw_headline(time: Points, space: Points, path: Path) -> None:
+    """The two questions of every run: which integrator, and which mesh."""
+    with page(path, "Error against cost", 1, 2, 5.2) as axes:
+        integrators.panel(axes[0], integrators.summary(time), "history")
+        axes[0].set(title="dynamic event, by integrator", ylabel="relative error of the tip history (L2)")
+        refinement.panel(axes[1], space, "onset opening")
+        axes[1].set(title="loading to the onset, by element and mesh")
+        for ax in axes:
+            ax.legend(fontsize=5.5, loc="upper right")
 
 
 if __name__ == "__main__":
