@@ -3,13 +3,29 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
+import sys
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from skfsink.cli import command
 from skfsink.errors import ConvergenceError, InstabilityError, OutputError
+from skfsink.explicit import ExplicitControls
+from skfsink.progress import Display
+from skfsink.simulate import Interrupted
+from skfsink.study import integrators, models, solvers, systems
+from skfsink.study.body import SLAB, Body, Front, first_passages
+from skfsink.study.meshes import load_plate
 from skfsink.study.pareto import pareto_front
+from skfsink.study.part import Part, Planned
+from skfsink.study.rates import extrapolated, observed_rate
+from skfsink.study.refinement import plate
+from skfsink.study.speed_accuracy import run_parts, speed_accuracy
 from skfsink.study.store import Store
 
 
@@ -75,3 +91,188 @@ def test_pareto_front_of_a_known_set():
     points = [(3, 1), (1, 4), (2, 2), (2, 3), (4, 1), (5, 0.5), (1, 4), (0.5, np.inf), (np.nan, 0.1), (9, 0.6)]
     assert pareto_front(*zip(*points)) == [1, 2, 0, 5]
     assert pareto_front([], []) == []
+
+
+# --- rates ---
+@pytest.mark.parametrize("rate", [0.7, 1.0, 2.0])
+def test_extrapolation_recovers_limit_and_rate(rate: float):
+    """Fails if the limit of q + C h^p is not q, from three sizes or from five, or an observed rate is not p."""
+    h = np.array([0.8, 0.4, 0.25, 0.1, 0.05])
+    for some in (h, h[:3]):
+        limit, found = extrapolated(some, 3.0 - 0.5 * some**rate)
+        assert limit == pytest.approx(3.0, abs=1e-6) and found == pytest.approx(rate, abs=1e-9)
+    assert observed_rate(h, 7 * h**rate) == pytest.approx(rate)
+
+
+def test_passages_are_interpolated_within_the_step():
+    """Fails if the time at which a tip passes a mark is that of a step, or of a later passage."""
+    way = np.array([0.0, 0.0, 0.4, 0.4, 1.0])
+    times = [0.0, 1.0, 2.0, 3.0, 4.0]
+    np.testing.assert_allclose(first_passages(times, way, np.array([0.0, 0.1, 0.4, 0.7, 1.0])),
+                               [0.0, 1.25, 2.0, 3.5, 4.0])
+
+
+# --- the plates ---
+def test_tip_is_where_gamma_crosses_a_tenth():
+    """Fails if the tip jumps from node to node, or is not measured from the tip of the notch."""
+    sample = load_plate("plate0")
+    x, front = sample.space.X[:, 0], Front(sample)
+    for tip in (0.3, 0.3001, 0.77):
+        gamma = np.clip(0.1 + (x - 0.5 - tip), 0.0, 1.0)
+        assert front.tip(gamma) == pytest.approx(tip, abs=1e-9)
+    assert front.tip(np.ones_like(x)) == 0.0
+
+
+def test_division_keeps_the_plate():
+    """Fails if elements are lost or turned over, a boundary loses its nodes, or the rounding stays a polygon."""
+    sample = plate("coarse/2^1", "quads")
+    coarse = plate("coarse", "quads")
+    assert sample.space.n_elements == 4 * coarse.space.n_elements
+    assert sample.space.V.sum() == pytest.approx(coarse.space.V.sum(), rel=1e-3)
+    for name in ("top", "bottom", "left", "right", "notch"):
+        assert len(sample.nodes(name)) == 2 * len(coarse.nodes(name)) - (2 if name == "left" else 1)
+    X = sample.space.X[sample.nodes("notch")]
+    arc = X[X[:, 0] > 0.95]
+    np.testing.assert_allclose(np.hypot(arc[:, 0] - 0.95, arc[:, 1] - 2.0), 0.05, rtol=1e-6)
+    assert np.isin(np.unique(sample.space.mesh.facets[:, sample.space.mesh.boundary_facets()]),
+                   np.concatenate([*sample.boundaries.values()])).all()
+
+
+def test_half_plate_and_slab_are_the_plate():
+    """Fails if figures of a half, or of a slab held in z, are not those of the whole plate in plane strain."""
+    whole = Body(load_plate("half0", mirrored=True)).held_at(0.05)
+    half = Body(load_plate("half0"), models.HALF, 2).held_at(0.05)
+    slab = Body(load_plate("half0", mirrored=True, slab=(0.05, 1)), SLAB).held_at(0.05)
+    for other in (half, slab):
+        assert other == pytest.approx(whole, rel=1e-6)
+
+
+def test_an_event_that_does_not_arrive_is_an_error():
+    """Fails if a crack that has not gone the way is given an arrival time, or the onset is changed by an event."""
+    body = Body(load_plate("plate0"))
+    before = body.onset
+    with pytest.raises(ConvergenceError, match=r"mm of 1 mm in 2 µs"):
+        body.event(lambda b: b.explicit(ExplicitControls()), limit=2e-6)
+    found = body.event(lambda b: b.explicit(ExplicitControls()), run=0.1)
+    assert 3 < found["arrival_us"] < 15 and found["passed_us"][-1] == found["arrival_us"] and found["D"] > 0
+    assert (np.diff(found["passed_us"]) >= 0).all()
+    np.testing.assert_array_equal(body.onset.u, before.u)
+    assert body.onset.time == before.time
+
+
+# --- linear systems ---
+@pytest.mark.parametrize("field", ["density", "tangent"])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_all_solvers_solve_the_same_system(field: str, dim: int):
+    """Fails if a method leaves a residual, or figures of another system come out."""
+    system = systems.density_system(systems.body(dim, 500, 1)) if field == "density" else \
+        systems.tangent_system(systems.body(dim, 500, dim))
+    reference, _ = systems.direct(system)()()
+    for method in systems.METHODS[field]:
+        x, iterations = systems.SOLVERS[method](system)()()
+        np.testing.assert_allclose(x, reference, atol=1e-6 * abs(reference).max())
+        assert (iterations == 0) == (method == "direct")
+    if field == "density":
+        assert reference.min() < 1e-12 and reference.max() <= 1 + 1e-12
+
+
+def test_a_solution_over_the_cap_is_a_point(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
+    """Fails if a solution that was ended is dropped, or a larger one is tried after it."""
+    calls = []
+
+    def ended(arguments, **_):
+        calls.append(arguments[-1])
+        return subprocess.CompletedProcess(arguments, systems.OVER_TIME, "", "")
+
+    monkeypatch.setattr(solvers.subprocess, "run", ended)
+    planned = [p for p in solvers.plan(False) if p.key.startswith("tangent/3D/jacobi/")][-2:]
+    store = Store(tmp_path / "study.json", "a study")
+    points = {p.key: store.point(p.key, p.compute) for p in planned}
+    assert calls == ["300000"]
+    assert [p["failed"] for p in points.values()] == [
+        "over the cap: 120 s", "over the cap: 120 s at a smaller size already"]
+    assert solvers.exponents(solvers.family(points, "tangent", 3, "jacobi")) is None
+
+
+# --- studies ---
+def test_an_interrupted_part_goes_on(tmp_path: Path):
+    """Fails if Ctrl-C in the middle loses the points before it, or they are computed again."""
+    made: list[str] = []
+
+    def planned(stop: str) -> Part:
+        def compute(key: str) -> dict[str, Any]:
+            if key == stop:
+                raise KeyboardInterrupt
+            made.append(key)
+            if key == "b":
+                raise InstabilityError("blew up")
+            return {"value": key}
+        return Part("toy", lambda quick: [Planned(k, partial(compute, k)) for k in "abcd"],
+                    lambda points, path: path.write_text(",".join(points)), lambda points: [*points])
+
+    path = tmp_path / "toy.json"
+    with pytest.raises(Interrupted, match=r"2 points are in .*toy\.json"):
+        run_parts(Store(path, "toy"), [planned("c")], False, Display(quiet=True))
+    assert not (tmp_path / "toy_toy.png").exists()
+    run_parts(Store(path, "toy"), [planned("")], False, Display(quiet=True))
+    assert made == ["a", "b", "c", "d"]
+    assert (tmp_path / "toy_toy.png").read_text() == "a,b,c,d"
+    assert json.loads(path.read_text())["points"]["toy/b"]["failed"] == "blew up"
+
+
+def test_methods_that_fail_are_rows():
+    """Fails if a method that failed on a plate is given errors, or a good one is not measured by the reference."""
+    def run(shift: float) -> dict[str, Any]:
+        passed = 10.0 + shift + np.linspace(0, 1, 20)
+        return {"arrival_us": passed[-1], "passed_us": passed.tolist(), "D": 1.0 + shift, "cpu_s": 2.0}
+
+    points = {"onset/plate0": {}, "reference 0.2/plate0": run(0.1), "reference 0.1/plate0": run(0.0),
+              "explicit, default/plate0": run(0.11), "HHT, default/plate0": {"failed": "stalled", "cpu_s": 1.0}}
+    rows = {row["name"]: row for row in integrators.summary(points)}
+    assert rows["HHT, default"]["failed"] == "stalled" and "D" not in rows["HHT, default"]
+    assert rows["explicit, default"]["D"] == pytest.approx(0.11)
+    assert rows["explicit, default"]["history"] == pytest.approx(0.01)
+    assert rows["reference 0.2"]["arrival"] == pytest.approx(0.1 / 11)
+
+
+def test_changes_are_against_the_base_on_the_same_mesh():
+    """Fails if a variant is compared with another mesh, or one that fails on some mesh loses that."""
+    def run(opening: float, D: float) -> dict[str, Any]:
+        return {"onset": {"opening_mm": opening, "reaction_N_per_mm": 1.0, "loading_cpu_s": 1.0}, "arrival_us": 40.0,
+                "D": D, "cpu_s": 1.0}
+
+    points = {f"default/{s}": run(o, 1.0) for s, o in zip("012", (0.1, 0.2, 0.4))}
+    points |= {f"k = 50 MPa/{s}": run(1.1 * o, 2.0) for s, o in zip("012", (0.1, 0.2, 0.4))}
+    points["k = 50 MPa/1"] = {"failed": "arrested", "cpu_s": 1.0}
+    row, = models.changes(points)
+    assert row["onset opening"] == pytest.approx((0.1, 0.1, 0.1)) and row["D"] == pytest.approx((1.0, 1.0, 1.0))
+    assert row["cost"][0] == pytest.approx(1.0) and row["failed"] == "arrested (1 of 3 meshes)"
+
+
+@pytest.mark.slow
+def test_quick_study(tmp_path: Path):
+    """Fails if the quick study takes more than three minutes of one core, or a part leaves no picture.
+
+    A second call computes nothing, and one that would mix in figures of another version is refused.
+    """
+    command = [sys.executable, "-m", "skfsink.study.speed_accuracy", "--quick", "--quiet", "--out", str(tmp_path)]
+    before = os.times()
+    subprocess.run(command, check=True)
+    after = os.times()
+    assert sum(after[2:4]) - sum(before[2:4]) < 180
+    assert {p.name for p in tmp_path.glob("*.png")} == {
+        "speed_accuracy.png", *(f"speed_accuracy_{part}.png" for part in ("time", "space", "model", "solvers"))}
+    content = (tmp_path / "speed_accuracy.json").read_bytes()
+    subprocess.run(command, check=True, timeout=60)
+    assert (tmp_path / "speed_accuracy.json").read_bytes() == content
+    (tmp_path / "speed_accuracy.json").write_bytes(content.replace(b'"numpy": "', b'"numpy": "0.'))
+    refused = subprocess.run(command, capture_output=True, text=True)
+    assert refused.returncode == 2 and "--fresh" in refused.stderr
+
+
+def test_command_line_refuses_an_unknown_part(capsys: pytest.CaptureFixture[str]):
+    """Fails if a slip on the command line starts a study, or is more than one line."""
+    with pytest.raises(SystemExit) as end:
+        command(speed_accuracy, ["--only", "space-time"], package="study")
+    assert end.value.code == 2
+    assert capsys.readouterr().err.startswith("skfsink: ")
