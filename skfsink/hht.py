@@ -61,8 +61,10 @@ class HHT:
     ----------
     dt: size of the next step [s].   rejected: steps given up.   iterations: Newton iterations made.
     reaction: (n, dim) internal force of the last accepted state.
+    loading: long steps that are cut where failure begins are what is wanted.
     """
 
+    loading = False
     GROW = 1.5
     LEAST_J = 0.02
 
@@ -179,7 +181,7 @@ class HHT:
             if balanced and correction <= c.correction_tolerance * increment and settled:
                 if dt > self._failing_step and float((state.gamma - gamma).max()) > 0.5:
                     # converged, but to a crack that has run through a single step
-                    if not self._cut:
+                    if not (self.loading or self._cut):
                         log.warning("a step of %.3g s would let a crack run through at once: steps in which elements "
                                     "fail are cut to 0.1 l/c_s = %.3g s; --hht-dt at or below it spares the attempts",
                                     dt, self._failing_step)

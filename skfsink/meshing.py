@@ -28,6 +28,7 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 Box = tuple[float, float, float, float]  # x0, x1, y0, y1 of a rectangle of fine elements
 Band = tuple[float, float, float, float, float]  # x0, y0, x1, y1 of a line, and the distance from it
+Distance = Callable[[float, float], float]
 
 BOUNDARY_PREFIX = "boundary:"
 RIPPLE = 0.08  # root mean square of the relative ripple of the element size
@@ -61,13 +62,17 @@ class Edge(NamedTuple):
 
 @dataclass(frozen=True)
 class SizeField:
-    """Element size: `h` inside boxes and bands, growing by `grading` per unit of distance up to `h_coarse`."""
+    """Element size: `h` inside boxes and bands, growing by `grading` per unit of distance up to `h_coarse`.
+
+    With `distance`, of a point from a corridor of fine elements [mm], there are no boxes and bands.
+    """
 
     h: float
     h_coarse: float
     boxes: tuple[Box, ...] = ()
     bands: tuple[Band, ...] = ()
     grading: float = 0.15
+    distance: Distance | None = None
 
     def __post_init__(self) -> None:
         require("h", self.h, "mm", low=0, low_open=True)
@@ -76,6 +81,8 @@ class SizeField:
 
     def __call__(self, x: float, y: float) -> float:
         """The element size at a point."""
+        if self.distance is not None:
+            return min(self.h_coarse, self.h + self.grading * self.distance(x, y))
         away = [math.hypot(max(a - x, x - b, 0), max(c - y, y - d, 0)) for a, b, c, d in self.boxes]
         for a, b, c, d, width in self.bands:
             along = ((x - a) * (c - a) + (y - b) * (d - b)) / ((c - a) ** 2 + (d - b) ** 2)

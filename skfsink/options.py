@@ -9,16 +9,19 @@ from typing import Annotated, Any
 
 from cyclopts import Group, Parameter, Token
 
-from .errors import require
+from .errors import ParameterError, require
 from .explicit import ExplicitControls
 from .hht import HHTControls
 from .material import AAA, SinkLaw
-from .scene import Controls
+from .scene import Controls, choose
 from .statics import StaticsControls
 
-__all__ = ["SAMPLE", "Options"]
+__all__ = ["LAYOUTS", "QUANTITIES", "SAMPLE", "Options"]
 
-NOT_PHYSICS = ("out", "resume", "overwrite", "quiet", "given")  # say where a run goes, not what it is
+# say where a run goes, or how its model was chosen, not what it is
+NOT_PHYSICS = ("model", "tolerance", "quantity", "corridor", "out", "resume", "overwrite", "quiet", "given")
+LAYOUTS = ("corridor", "uniform", "two-pass")
+QUANTITIES = ("onset_load", "onset_displacement", "U", "D", "arrival_time", "tip_speed", "crack_path")
 
 
 def _number(kind: type, tokens: Sequence[Token]) -> Any:
@@ -34,9 +37,10 @@ def _numbers(name: str) -> Parameter:
     return Parameter(group=Group.create_ordered(name), converter=_number)
 
 
-SAMPLE, MATERIAL, SINK, LOADING, ANALYSIS, EXPLICIT, HHT, CONTROLS = map(_numbers, (
-    "Sample", "Material", "Sink", "Loading", "Analysis", "Explicit integrator", "HHT integrator", "Controls"))
+SAMPLE, MODEL, MATERIAL, SINK, LOADING, ANALYSIS, EXPLICIT, HHT, CONTROLS = map(_numbers, (
+    "Sample", "Model", "Material", "Sink", "Loading", "Analysis", "Explicit integrator", "HHT integrator", "Controls"))
 OUTPUT = Parameter(group=Group.create_ordered("Output"))
+MODEL_FLAG = Parameter(group=MODEL.group)
 FLAG = Parameter(negative="", show_default=False)
 
 
@@ -47,6 +51,25 @@ class Options:
 
     Parameters
     ----------
+    model
+        "auto" (the cheapest one whose measured error is within `tolerance`), or a model by name; docs/models.md lists
+        them. It sets the options of this group, `analysis`, `integrator` and `element`.
+    tolerance
+        Of "auto": greatest relative error of `quantity`, > 0.
+    quantity
+        What "auto" is to get right: "onset_load", "onset_displacement", "U", "D", "arrival_time", "tip_speed" or
+        "crack_path".
+    start
+        Of a dynamic analysis: "onset" (statics up to there) or "rest" (dynamics from the unloaded body on).
+    half
+        Compute the half (dog-bone: quarter) that mirror symmetry leaves.
+    dimensions
+        2 or 3; 3 makes a plate a slab of one layer of hexahedra. 0 takes those of the sample.
+    mesh_layout
+        "corridor" (fine where a crack may run), "uniform" (fine everywhere; needs gmsh) or "two-pass" (fine along the
+        path of a first pass on elements twice as large; needs gmsh, or is "corridor").
+    active_zone
+        Explicit steps solve for γ only where it changes.
     c1
         First constant of the stored energy [MPa], > 0.
     c2
@@ -115,10 +138,20 @@ class Options:
         Use an output folder that is not empty.
     quiet
         Show no progress.
+    corridor
+        Mesh that the first of two passes has left; set by the run.
     given
         Names of the options that a command line gave; a resumed run checks that they are its own.
     """
 
+    model: Annotated[str, MODEL] = ""
+    tolerance: Annotated[float, MODEL] = 0.05
+    quantity: Annotated[str, MODEL] = "U"
+    start: Annotated[str, MODEL] = "onset"
+    half: Annotated[bool, MODEL_FLAG] = False
+    dimensions: Annotated[int, MODEL] = 0
+    mesh_layout: Annotated[str, MODEL] = "corridor"
+    active_zone: Annotated[bool, MODEL_FLAG] = True
     c1: Annotated[float, MATERIAL] = 0.617
     c2: Annotated[float, MATERIAL] = 1.215
     bulk_modulus: Annotated[float, MATERIAL] = 500.0
@@ -153,10 +186,19 @@ class Options:
     resume: Annotated[Path | None, OUTPUT] = None
     overwrite: Annotated[bool, OUTPUT, FLAG] = False
     quiet: Annotated[bool, OUTPUT, FLAG] = False
+    corridor: Annotated[Path | None, Parameter(parse=False)] = None
     given: Annotated[frozenset[str], Parameter(parse=False)] = frozenset()
 
     def __post_init__(self) -> None:
         require("speed", self.speed, "mm/s", low=0, low_open=True)
+        require("tolerance", self.tolerance, low=0, low_open=True)
+        choose("quantity", self.quantity, QUANTITIES)
+        choose("mesh-layout", self.mesh_layout, LAYOUTS)
+        for name in ("half", "active_zone"):
+            if not isinstance(getattr(self, name), bool):
+                raise ParameterError(f"{name.replace('_', '-')} must be true or false; got {getattr(self, name)!r}")
+        if self.dimensions not in (0, 2, 3):
+            raise ParameterError(f"dimensions must be 2, 3, or 0 for those of the sample; got {self.dimensions!r}")
         self.material(), self.sink_law(), self.controls()
 
     def material(self) -> AAA:
@@ -172,8 +214,8 @@ class Options:
         return Controls(
             self.analysis, self.integrator, self.sink, self.element, self.overshoot, self.deletion, self.force_floor,
             self.event_time, self.aftermath, self.record_every, self.frame_every, self.balance_tolerance,
-            self.checkpoint_every,
-            self.threads, ExplicitControls(self.courant, self.gamma_every, self.mass_floor),
+            self.checkpoint_every, self.threads, self.start, self.active_zone,
+            ExplicitControls(self.courant, self.gamma_every, self.mass_floor),
             HHTControls(self.hht_alpha, self.hht_dt, coupling=self.coupling, mass=self.mass,
                         mass_floor=self.mass_floor),
             StaticsControls(front=self.front))

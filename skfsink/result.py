@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from .output import versions
+from .quantities import measured
 from .scene import Scene
 from .simulate import Simulation
 from .state import State
@@ -73,6 +74,8 @@ def summarize(scene: Scene, simulation: Simulation) -> dict[str, Any]:
                    "external_work": onset["work"] + ledger.work, "deletion": ledger.deletion,
                    "numerical": ledger.numerical, "released": ledger.released,
                    "balance_error_relative": max(balances, default=0.0) / scale},
+        "quantities": measured(scene, recorder), "model": dict(scene.choice) or None,
+        "whole": {"energy": scene.whole.energy, "load": scene.whole.load, "displacement": scene.whole.displacement},
         "deleted_elements": int(state.deleted.sum()), "warnings": simulation.notes.texts,
         "cost": {"wall_s": {k: round(v, 3) for k, v in cost["wall"].items()}, "steps": cost["steps"],
                  "gamma_solves": cost["gamma_solves"], "factorisations": cost["factorisations"],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import inspect
+import logging
 import shlex
 import tomllib
 from collections.abc import Callable
@@ -12,18 +13,21 @@ from pathlib import Path
 from typing import Any
 
 from .checkpoint import load_checkpoint, load_state
+from .corridor import MESH, corridor_report, has_gmsh, lay_corridor
 from .errors import OutputError, ParameterError
+from .models import AUTO, choose_model
 from .options import NOT_PHYSICS, Options
 from .output import History, prepare_folder, write_atomic, write_summary
 from .pictures import draw_comparison, draw_run
 from .progress import Display
 from .result import Result, summarize
-from .scene import Scene, read_parameters
+from .scene import Scene, read_choice, read_parameters
 from .simulate import Interrupted, Simulation, onset_copy
 from .state import State
 
 __all__ = ["read_scene", "run_case"]
 
+log = logging.getLogger(__name__)
 SceneMaker = Callable[[dict[str, Any], Options], Scene]
 SCENE, SUMMARY = "scene.toml", "summary.json"
 
@@ -41,19 +45,31 @@ def run_case(case: Callable[..., Result], make_scene: SceneMaker, own: dict[str,
     name = case.__name__
     if Path(own["mesh"]).suffix:  # a file: the run may be resumed from another folder
         own = {**own, "mesh": str(Path(own["mesh"]).absolute())}
-    if options.resume is not None:
-        defaults = {k: p.default for k, p in inspect.signature(case).parameters.items()}
-        own, options = _resumed(name, own, defaults, options)
-    folder = options.resume or options.out or _default_folder(name, own, options)
+    defaults = {k: p.default for k, p in inspect.signature(case).parameters.items()}
+    choice: dict[str, Any] = {}
     resume = options.resume is not None
+    if resume:
+        own, options, choice = _resumed(name, own, defaults, options)
+    elif options.model:
+        options, choice = choose_model(name, own, defaults, options)
+    folder = options.resume or options.out or _default_folder(name, own, options)
+    note = ""
+    if options.mesh_layout == "two-pass" and not has_gmsh():
+        note = "there is no gmsh to make the mesh of two passes: the mesh of the layout corridor is taken"
+        options = replace(options, mesh_layout="corridor")
     try:
         with Display(options.quiet) as display:
-            scene = make_scene(own, options)
-            if options.analysis == "both":
-                return _run_both(scene, folder, display, resume, options.overwrite)
+            if choice:
+                display.say(choice["text"])
+            scene = replace(make_scene(own, options), choice=choice)
             if not resume:
                 _begin(folder, options.overwrite)
-            return _run_one(scene, folder, display, resume)
+                if options.mesh_layout == "two-pass":
+                    options = lay_corridor(scene, own, options, folder, display)
+                    scene = replace(make_scene(own, options), choice=choice)
+            if options.analysis == "both":
+                return _run_both(scene, folder, display, resume, note)
+            return _run_one(scene, folder, display, resume, note=note)
     except (Interrupted, KeyboardInterrupt):
         begun = (folder / SCENE).exists()
         raise Interrupted("interrupted; " + (f"go on with --resume {shlex.quote(str(folder))}" if begun else
@@ -77,7 +93,7 @@ def read_scene(folder: Path) -> Scene:
         stored = read_parameters(folder, case)
         own = {name: stored.pop(name) for name in inspect.signature(getattr(module, case)).parameters
                if name != "options"}
-        options = replace(Options(), **stored)
+        options = replace(Options(), **stored, corridor=_corridor(folder))
     except (ModuleNotFoundError, UnicodeDecodeError, tomllib.TOMLDecodeError, AttributeError, KeyError,
             TypeError) as error:
         raise OutputError(f"{path} is not the scene of a run: {error}") from None
@@ -85,20 +101,31 @@ def read_scene(folder: Path) -> Scene:
     return scene
 
 
+def _corridor(folder: Path) -> Path:
+    """Mesh of two passes of a run, or of the two runs that it is one of."""
+    above = folder.parent / MESH
+    return above if not (folder / MESH).exists() and above.exists() else folder / MESH
+
+
 def _default_folder(case: str, own: dict[str, Any], options: Options) -> Path:
     name = f"{Path(own['mesh']).stem}-{options.analysis}"
+    if options.model:
+        return Path("results") / case / f"{Path(own['mesh']).stem}-{options.model}"
     if options.analysis != "quasistatic" and options.integrator != "explicit":
         name += f"-{options.integrator}"
     return Path("results") / case / name
 
 
 def _resumed(case: str, own: dict[str, Any], defaults: dict[str, Any],
-             options: Options) -> tuple[dict[str, Any], Options]:
+             options: Options) -> tuple[dict[str, Any], Options, dict[str, Any]]:
     folder = options.resume
     assert folder is not None
     if options.out is not None and options.out.absolute() != folder.absolute():
         raise ParameterError(f"--out {options.out} and --resume {folder} are two folders; a run stays in its own")
-    stored = read_parameters(folder, case)
+    stored, choice = read_parameters(folder, case), read_choice(folder)
+    if options.model not in ("", AUTO, choice.get("model")):
+        raise ParameterError(f"--model {options.model} is not that of the run in {folder} ({choice.get('model')}); "
+                             f"a resumed run keeps its scene")
     defaults = {**Options().parameters(), **defaults}
     for name, value in {**own, **options.parameters()}.items():
         if (name in options.given or value != defaults[name]) and value != stored.get(name):
@@ -111,7 +138,7 @@ def _resumed(case: str, own: dict[str, Any], defaults: dict[str, Any],
             raise KeyError(*sorted(unknown))
     except KeyError as error:
         raise OutputError(f"{folder / SCENE} is not the scene of a run: parameter {error}") from None
-    return own, replace(options, **stored)
+    return own, replace(options, **stored, corridor=_corridor(folder)), choice
 
 
 def _begin(folder: Path, overwrite: bool) -> None:
@@ -121,7 +148,7 @@ def _begin(folder: Path, overwrite: bool) -> None:
         (folder / name).unlink(missing_ok=True)
 
 
-def _run_both(scene: Scene, folder: Path, display: Display, resume: bool, overwrite: bool) -> Result:
+def _run_both(scene: Scene, folder: Path, display: Display, resume: bool, note: str) -> Result:
     scenes = {analysis: scene.part(analysis) for analysis in ("dynamic", "quasistatic")}
     begun = {analysis: resume and (folder / analysis / SCENE).exists() for analysis in scenes}
     for analysis, part in scenes.items():  # refuse before any file is touched
@@ -130,16 +157,15 @@ def _run_both(scene: Scene, folder: Path, display: Display, resume: bool, overwr
             if analysis == "dynamic" and state.phase != "loading":
                 load_state(folder / analysis / Simulation.ONSET, part.fingerprint)
     if not resume:
-        _begin(folder, overwrite)
         for analysis in scenes:
-            _begin(folder / analysis, overwrite)
+            _begin(folder / analysis, overwrite=True)
         write_atomic(folder / SCENE, scene.toml())
     parts: dict[str, Result] = {}
     onset: State | None = None
     for analysis, part in scenes.items():
         if not begun[analysis]:
             _begin(folder / analysis, overwrite=True)
-        parts[analysis] = _run_one(part, folder / analysis, display, begun[analysis], onset)
+        parts[analysis] = _run_one(part, folder / analysis, display, begun[analysis], onset, note)
         onset = load_state(folder / "dynamic" / Simulation.ONSET, scenes["dynamic"].fingerprint)
     display.phase("output")
     draw_comparison(parts["dynamic"], parts["quasistatic"], folder)
@@ -151,8 +177,12 @@ def _run_both(scene: Scene, folder: Path, display: Display, resume: bool, overwr
     return Result(folder, scene, summary, first.history, first.state, parts)
 
 
-def _run_one(scene: Scene, folder: Path, display: Display, resume: bool, onset: State | None = None) -> Result:
+def _run_one(scene: Scene, folder: Path, display: Display, resume: bool, onset: State | None = None,
+             note: str = "") -> Result:
     simulation = Simulation(scene, folder, display, resume)
+    if note:
+        with simulation.notes:
+            log.warning(note)
     if not resume:
         simulation.checkpoint()  # from here on the run can be resumed, whenever it is killed
         write_atomic(folder / SCENE, scene.toml())
@@ -164,7 +194,9 @@ def _run_one(scene: Scene, folder: Path, display: Display, resume: bool, onset: 
     display.update(0.0, "")
     draw_run(scene, folder, simulation.recorder)
     simulation._lap("output")
-    summary = summarize(scene, simulation)
+    two = scene.parameters["mesh_layout"] == "two-pass"
+    corridor = {"corridor": corridor_report(simulation, _corridor(folder).parent)} if two else {}  # it may warn
+    summary = {**summarize(scene, simulation), **corridor}
     write_summary(folder / SUMMARY, summary)
     display.update(1.0, str(folder))
     return Result(folder, scene, summary, History.load(folder / "history.csv"), state, {})

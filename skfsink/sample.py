@@ -20,7 +20,7 @@ from .meshing import read_mesh
 from .shapes import SHAPES
 from .space import Space
 
-__all__ = ["Sample", "data_folder", "load_sample", "shape_sample"]
+__all__ = ["Sample", "data_folder", "load_sample", "shape_mesh", "shape_sample"]
 
 _CELLS = {"quad": (skfem.MeshQuad, "line"), "hexahedron": (skfem.MeshHex, "quad")}
 
@@ -34,11 +34,13 @@ class Sample:
     name: of the mesh.
     space: spaces on it.
     boundaries: nodes of each named boundary, ascending.
+    made: whether the mesh was made by gmsh, and is not a file of the user's or a committed one.
     """
 
     name: str
     space: Space
     boundaries: Mapping[str, np.ndarray]
+    made: bool = False
 
     def nodes(self, boundary: str) -> np.ndarray:
         """Nodes of a named boundary.
@@ -86,7 +88,7 @@ def load_sample(case: str, mesh: str, make: Callable[[], meshio.Mesh] | None = N
     """
     lift = lift or _as_it_is
     if make is not None:
-        return _from_meshio(mesh, lift(_read(make, f"the mesh {mesh} cannot be made")))
+        return _from_meshio(mesh, lift(_read(make, f"the mesh {mesh} cannot be made")), made=True)
     folder = data_folder(case) / "meshes"
     known = sorted(p.stem for p in folder.glob("*.vtu"))
     path = folder / f"{mesh}.vtu"
@@ -100,11 +102,13 @@ def load_sample(case: str, mesh: str, make: Callable[[], meshio.Mesh] | None = N
     return _from_meshio(mesh, lift(_read(lambda: read_mesh(path), f"the mesh file {path} cannot be read")))
 
 
-def shape_sample(case: str, own: Mapping[str, Any], lift: Callable[[meshio.Mesh], meshio.Mesh] | None = None) -> Sample:
+def shape_sample(case: str, own: Mapping[str, Any], lift: Callable[[meshio.Mesh], meshio.Mesh] | None = None,
+                 settings: Mapping[str, Any] | None = None) -> Sample:
     """The sample of a case whose shape is one of :data:`.shapes.SHAPES`.
 
     `own` are the arguments of the case function: `mesh`, `mesh_seed`, and the dimensions, named as in the function
-    of the shape. The committed mesh is read where they are those of the shape; gmsh makes another one else.
+    of the shape; `settings` are arguments of that function which are not those of the named mesh. The committed mesh
+    is read where nothing has changed; gmsh makes another one else.
 
     Raises
     ------
@@ -114,18 +118,31 @@ def shape_sample(case: str, own: Mapping[str, Any], lift: Callable[[meshio.Mesh]
         As of :func:`load_sample`.
     """
     shape, name = SHAPES[case], str(own["mesh"])
-    seed = int(require("mesh-seed", own["mesh_seed"], low=0, whole=True))
-    defaults = {k: p.default for k, p in inspect.signature(shape.make).parameters.items() if k in own}
-    changed = {k: own[k] for k, default in defaults.items() if own[k] != default}
-    if not (seed or changed):
+    changed = _changed(case, own, settings or {})
+    if not changed:
         return load_sample(case, name, lift=lift)
     if Path(name).suffix:
-        words = [*(k.replace("_", "-") for k in defaults), "mesh-seed"]
+        words = [k.replace("_", "-") for k in (*inspect.signature(shape.make).parameters, "mesh_seed") if k in own]
         raise ParameterError(f"{', '.join(words[:-1])} and {words[-1]} are for the meshes {', '.join(shape.meshes)}; "
                              f"the mesh file {name} is as it is")
     if name not in shape.meshes:
         return load_sample(case, name)  # which says what there is
-    return load_sample(case, name, lambda: shape.make(**{**shape.meshes[name], **changed}, seed=seed), lift)
+    return load_sample(case, name, lambda: shape_mesh(case, own, settings), lift)
+
+
+def shape_mesh(case: str, own: Mapping[str, Any], settings: Mapping[str, Any] | None = None) -> meshio.Mesh:
+    """The section of a named mesh with the dimensions, the seed and the settings of :func:`shape_sample`, by gmsh."""
+    shape = SHAPES[case]
+    mesh: meshio.Mesh = shape.make(**{**shape.meshes[own["mesh"]], **_changed(case, own, settings or {})})
+    return mesh
+
+
+def _changed(case: str, own: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Arguments of the shape's function that are not those of the committed mesh."""
+    seed = int(require("mesh-seed", own["mesh_seed"], low=0, whole=True))
+    dimensions = {k: own[k] for k, p in inspect.signature(SHAPES[case].make).parameters.items()
+                  if k in own and own[k] != p.default}
+    return {**dimensions, **settings, **({"seed": seed} if seed else {})}
 
 
 def _as_it_is(mesh: meshio.Mesh) -> meshio.Mesh:
@@ -144,7 +161,7 @@ def _read(source: Callable[[], meshio.Mesh], failure: str) -> meshio.Mesh:
         raise MeshError(f"{failure}: {reason.splitlines()[0]}") from None
 
 
-def _from_meshio(name: str, data: meshio.Mesh) -> Sample:
+def _from_meshio(name: str, data: meshio.Mesh, made: bool = False) -> Sample:
     present = [kind for kind in _CELLS if kind in data.cells_dict]
     others = sorted({b.type for b in data.cells} - {"quad", "hexahedron", "line", "vertex"})
     if others or not any(len(data.cells_dict[kind]) for kind in present):
@@ -162,7 +179,7 @@ def _from_meshio(name: str, data: meshio.Mesh) -> Sample:
         space = Space(mesh_class(np.ascontiguousarray(points.T), np.ascontiguousarray(connectivity.astype(np.int64))))
     except MeshError as error:
         raise MeshError(f"mesh {name}: {error}") from None
-    return Sample(Path(name).stem, space, _boundaries(data, facet))
+    return Sample(Path(name).stem, space, _boundaries(data, facet), made)
 
 
 def _boundaries(data: meshio.Mesh, facet: str) -> dict[str, np.ndarray]:

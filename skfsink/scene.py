@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -15,16 +15,19 @@ import tomli_w
 from .density import SINKS
 from .errors import OutputError, ParameterError, require
 from .explicit import ExplicitControls
+from .halving import Whole
 from .hht import HHTControls
 from .material import Material, SinkLaw
 from .momentum import ELEMENTS, check_element
 from .sample import Sample
 from .statics import StaticsControls
 
-__all__ = ["ANALYSES", "INTEGRATORS", "Controls", "Grip", "Scene", "choose", "read_parameters"]
+__all__ = ["ANALYSES", "INTEGRATORS", "STARTS", "Controls", "Grip", "Scene", "choose", "read_choice",
+           "read_parameters"]
 
 ANALYSES = ("dynamic", "quasistatic", "both")
 INTEGRATORS = ("explicit", "hht")
+STARTS = ("onset", "rest")
 
 
 def choose(name: str, value: str, allowed: tuple[str, ...]) -> str:
@@ -62,6 +65,8 @@ class Controls:
     balance_tolerance: balance error, relative to the onset energy, at which a run is stopped, (0, 1].
     checkpoint_every: wall time between checkpoints [s], > 0.
     threads: of the factorisations, >= 1; runs are reproducible to the last bit with 1.
+    start: of a dynamic analysis, "onset" (statics up to there) or "rest" (see :mod:`.rest`).
+    active_zone: explicit steps solve for gamma only where it changes (see :mod:`.zone`).
     """
 
     analysis: str = "dynamic"
@@ -78,6 +83,8 @@ class Controls:
     balance_tolerance: float = 0.05
     checkpoint_every: float = 20.0
     threads: int = 1
+    start: str = "onset"
+    active_zone: bool = True
     explicit: ExplicitControls = field(default_factory=ExplicitControls)
     hht: HHTControls = field(default_factory=HHTControls)
     statics: StaticsControls = field(default_factory=StaticsControls)
@@ -85,6 +92,9 @@ class Controls:
     def __post_init__(self) -> None:
         choose("analysis", self.analysis, ANALYSES)
         choose("integrator", self.integrator, INTEGRATORS)
+        choose("start", self.start, STARTS)
+        if self.start == "rest" and self.analysis != "dynamic":
+            raise ParameterError(f"start rest is for analysis dynamic; got {self.analysis}")
         choose("sink", self.sink, SINKS)
         choose("element", self.element, ELEMENTS)
         require("overshoot", self.overshoot, low=0, high=0.1, low_open=True)
@@ -95,6 +105,10 @@ class Controls:
         require("aftermath", self.aftermath, "s", low=0)
         require("balance-tolerance", self.balance_tolerance, low=0, high=1, low_open=True)
         require("threads", self.threads, low=1, high=256, whole=True)
+
+
+def _first_two(X: np.ndarray) -> np.ndarray:
+    return X[:, :2]
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,8 +124,12 @@ class Scene:
     grips: the first one's reaction is the load that is reported, in the direction of its velocity.
     faces: in three dimensions, the surfaces of a sheet along which a crack runs; they are no edges it arrives at.
     view: azimuth and elevation [degrees] from which pictures show a body in space.
+    rollers: boundaries held on planes of symmetry or between faces; they are no grips.
+    whole: factors from the figures of the body to those of the whole sample.
+    flat: maps points of the body (n, dim) to its section (n, 2) [mm].
     controls: how it is computed.
     assumed: statements about lengths that the paper does not print.
+    choice: of a model, as it is printed and stored; it does not decide results beyond the parameters.
 
     Raises
     ------
@@ -130,11 +148,15 @@ class Scene:
     grips: tuple[Grip, ...]
     faces: tuple[str, ...] = ()
     view: tuple[float, float] = (-75.0, 60.0)
+    rollers: tuple[Grip, ...] = ()
+    whole: Whole = Whole()  # noqa: RUF009
+    flat: Callable[[np.ndarray], np.ndarray] = _first_two
     controls: Controls = field(default_factory=Controls)
     assumed: tuple[str, ...] = ()
+    choice: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for grip in self.grips:
+        for grip in (*self.grips, *self.rollers):
             self.sample.nodes(grip.boundary)
         check_element(self.controls.element, self.sample.space)
 
@@ -147,7 +169,7 @@ class Scene:
         """Mask of the free degrees of freedom (n*dim,) and velocity of the held ones (n, dim) [mm/s]."""
         X = self.sample.space.X
         free, velocity = np.ones(X.shape, bool), np.zeros(X.shape)
-        for grip in self.grips:
+        for grip in (*self.grips, *self.rollers):
             nodes = self.sample.nodes(grip.boundary)
             for i, value in enumerate(grip.velocity):
                 if value is not None:
@@ -167,12 +189,14 @@ class Scene:
                 "and the parameters below.\n"
                 "# Plain numbers are in N, mm, MPa and s; density in kg/m^3.\n")
         parameters = {k: v.item() if isinstance(v, np.generic) else v for k, v in self.parameters.items()}
-        return head + tomli_w.dumps({"case": self.case, "parameters": parameters, "assumed": list(self.assumed)})
+        choice = {"choice": dict(self.choice)} if self.choice else {}
+        return head + tomli_w.dumps({"case": self.case, "parameters": parameters, "assumed": list(self.assumed),
+                                     **choice})
 
     @property
     def fingerprint(self) -> str:
         """Hash of all that decides the results of the run: the parameters, and the mesh but for where its file is."""
-        text = replace(self, parameters={**self.parameters, "mesh": ""}).toml()
+        text = replace(self, parameters={**self.parameters, "mesh": ""}, choice={}).toml()
         hashed, space = hashlib.sha256(text.encode()), self.sample.space
         for array in (space.X, space.conn, *(nodes for _, nodes in sorted(self.sample.boundaries.items()))):
             hashed.update(array.tobytes())
@@ -198,3 +222,8 @@ def read_parameters(folder: Path, case: str) -> dict[str, Any]:
     if found != case:
         raise OutputError(f"{folder} holds a run of case {found}, not of {case}")
     return parameters
+
+
+def read_choice(folder: Path) -> dict[str, Any]:
+    """The choice of a model in the `scene.toml` of a run; empty if there is none."""
+    return dict(tomllib.loads((folder / "scene.toml").read_text()).get("choice", {}))

@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,35 +18,38 @@ import meshio
 import numpy as np
 
 from .errors import require
-from .meshing import Band, Box, Edge, SizeField, completed, mesh_outline, scaled_jacobian, write_mesh
+from .meshing import Band, Box, Distance, Edge, SizeField, completed, mesh_outline, scaled_jacobian, write_mesh
 
 __all__ = ["SHAPES", "Shape", "check_dog_bone", "check_plate", "check_shell",
            "check_two_notches"]
 
 Point = tuple[float, float]
+Image = Callable[[np.ndarray], np.ndarray]
 
 
 def single_edge_notch_mesh(*, side: float = 4.0, notch: float = 1.0, notch_width: float = 0.1,
                            h: float = 0.1 / 3, h_coarse: float = 0.11, half_height: float = 1.7,
-                           seed: int = 0) -> meshio.Mesh:
+                           symmetry: str = "none", distance: Distance | None = None, seed: int = 0) -> meshio.Mesh:
     """Mesh the square plate [0, side]^2 with a round-tipped notch from the left edge at mid-height.
 
     `notch` is the length of the notch up to its tip, the top of a semicircle of diameter `notch_width`. The
     element size is `h` in the corridor ahead of the notch, up to `half_height` above and below it and out to
-    the right edge, and is graded to `h_coarse` elsewhere. Lengths are in mm. Each `seed` gives another mesh
-    of the same sizes. The boundaries are `left` (without the mouth of the notch), `right`, `top`, `bottom`
-    and `notch` (both flanks and the tip).
+    the right edge, and is graded to `h_coarse` elsewhere; with `distance` (see :class:`.SizeField`) the corridor is
+    where that is 0. Lengths are in mm. Each `seed` gives another mesh of the same sizes. With `symmetry` "mirror" the
+    upper half is the mirror image of the lower one. The boundaries are `left` (without the mouth of the notch),
+    `right`, `top`, `bottom` and `notch` (both flanks and the tip).
     """
     check_plate(side, notch, notch_width)
     require("half-height", half_height, "mm", low=0, low_open=True)
     middle = side / 2
     corridor = (notch - 1.5 * notch_width, side, middle - half_height, middle + half_height)
-    return _edge_notched(side, notch, notch_width, SizeField(h, h_coarse, (corridor,)), seed)
+    return _edge_notched(side, notch, notch_width, SizeField(h, h_coarse, (corridor,), distance=distance), symmetry,
+                         seed)
 
 
 def simple_shear_mesh(*, side: float = 4.0, notch: float = 2.0, notch_width: float = 0.1, h: float = 0.025,
                       h_coarse: float = 0.11, half_width: float = 0.5, symmetry: str = "mirror",
-                      seed: int = 0) -> meshio.Mesh:
+                      distance: Distance | None = None, seed: int = 0) -> meshio.Mesh:
     """Mesh the square plate [0, side]^2 with a round-tipped notch from the left edge to the middle.
 
     Sheared to the right at its top, the plate cracks from the tip down to the right. Elements are of size `h` around
@@ -58,19 +62,14 @@ def simple_shear_mesh(*, side: float = 4.0, notch: float = 2.0, notch_width: flo
     middle, r = side / 2, notch_width / 2
     tip: Box = (notch - 0.25, notch + 0.35, middle - 0.35, middle + 0.35)
     path: Band = (notch, middle, notch + 0.75 * middle, 0, half_width)
-    size = SizeField(h, h_coarse, (tip,), (path,))
-    if symmetry == "none":
-        return _edge_notched(side, notch, notch_width, size, seed)
-    lower = [Edge("bottom", (side, 0)), Edge("right", (side, middle)), Edge("seam", (notch, middle)),
-             Edge("notch", (notch - r, middle - r), via=(notch - r + r * math.sqrt(0.5), middle - r * math.sqrt(0.5))),
-             Edge("notch", (0, middle - r)), Edge("left", (0, 0))]
-    half = mesh_outline(lower, size, seed=seed)
-    return completed(half, "seam", lambda p: p * (1, -1) + (0, side), {"bottom": "top"})
+    return _edge_notched(side, notch, notch_width, SizeField(h, h_coarse, (tip,), (path,), distance=distance), symmetry,
+                         seed)
 
 
 def symmetric_double_edge_notch_mesh(*, side: float = 3.0, notch: float = 0.5, notch_width: float = 0.1,
                                      h: float = 0.025, h_coarse: float = 0.11, half_height: float = 0.7,
-                                     symmetry: str = "turn", seed: int = 0) -> meshio.Mesh:
+                                     symmetry: str = "turn", distance: Distance | None = None,
+                                     seed: int = 0) -> meshio.Mesh:
     """Mesh the square plate [0, side]^2 with equal notches from the left and the right edge at mid-height.
 
     Fine within `half_height` of mid-height between the notches. The right half is the left one turned by half a turn,
@@ -81,16 +80,20 @@ def symmetric_double_edge_notch_mesh(*, side: float = 3.0, notch: float = 0.5, n
     require("half-height", half_height, "mm", low=0, low_open=True)
     middle = side / 2
     fine = (notch - 0.15, side - notch + 0.15, middle - half_height, middle + half_height)
+    size = SizeField(h, h_coarse, (fine,), distance=distance)
     if symmetry == "mirror":
-        half = mesh_outline(_left_half(side, notch, notch_width, middle), SizeField(h, h_coarse, (fine,)), seed=seed)
-        return completed(half, "seam", lambda p: p * (-1, 1) + (side, 0), {"left": "right"})
-    return _double_edge_notched(side, notch, notch_width, 0.0, SizeField(h, h_coarse, (fine,)), symmetry, seed)
+        def image(points: np.ndarray) -> np.ndarray:
+            return points * (-1, 1) + (side, 0)
+
+        half = mesh_outline(_left_half(side, notch, notch_width, middle), _even(size, image), seed=seed)
+        return completed(half, "seam", image, {"left": "right"})
+    return _double_edge_notched(side, notch, notch_width, 0.0, size, symmetry, seed)
 
 
 def asymmetric_double_edge_notch_mesh(*, side: float = 4.0, notch: float = 0.6, notch_width: float = 0.1,
                                       offset: float = 1.0, h: float = 0.025, h_coarse: float = 0.11,
                                       half_height: float = 1.35, symmetry: str = "turn",
-                                      seed: int = 0) -> meshio.Mesh:
+                                      distance: Distance | None = None, seed: int = 0) -> meshio.Mesh:
     """Mesh the square plate [0, side]^2 with a notch from each side, the right one higher by `offset`.
 
     Both are `offset`/2 from mid-height. Fine within `half_height` of mid-height, where the notches and the cracks
@@ -101,11 +104,13 @@ def asymmetric_double_edge_notch_mesh(*, side: float = 4.0, notch: float = 0.6, 
     require("offset", offset, "mm", low=0, high=side - 2 * notch_width, high_open=True)
     require("half-height", half_height, "mm", low=0, low_open=True)
     fine = (0.0, side, side / 2 - half_height, side / 2 + half_height)
-    return _double_edge_notched(side, notch, notch_width, offset, SizeField(h, h_coarse, (fine,)), symmetry, seed)
+    size = SizeField(h, h_coarse, (fine,), distance=distance)
+    return _double_edge_notched(side, notch, notch_width, offset, size, symmetry, seed)
 
 
 def dog_bone_mesh(*, length: float = 10.0, gauge_length: float = 4.0, gauge_width: float = 1.5, grip_width: float = 3.0,
-                  fillet: float = 0.75, h: float = 0.02, h_coarse: float = 0.11, seed: int = 0) -> meshio.Mesh:
+                  fillet: float = 0.75, h: float = 0.02, h_coarse: float = 0.11, distance: Distance | None = None,
+                  seed: int = 0) -> meshio.Mesh:
     """Mesh the section of a dog-bone: centre at the origin, pulled along y.
 
     A gauge of `gauge_length` and `gauge_width` widens over quarter circles of radius `fillet`, tangent to it, to
@@ -119,14 +124,22 @@ def dog_bone_mesh(*, length: float = 10.0, gauge_length: float = 4.0, gauge_widt
     outline = [Edge("waist", (neck, 0)), Edge("side", (neck, gauge)),
                Edge("side", (rim, shoulder), via=(neck + arc, shoulder - arc)), *straight, Edge("side", (wide, end)),
                Edge("top", (0, end)), Edge("axis", (0, 0))]
-    quarter = mesh_outline(outline, SizeField(h, h_coarse, ((0, rim, 0, shoulder),)), seed=seed)
-    half = completed(quarter, "axis", lambda p: p * (-1, 1))
-    return completed(half, "waist", lambda p: p * (1, -1), {"top": "bottom"})
+
+    def across(points: np.ndarray) -> np.ndarray:
+        return points * (-1, 1)
+
+    def along(points: np.ndarray) -> np.ndarray:
+        return points * (1, -1)
+
+    size = SizeField(h, h_coarse, ((0, rim, 0, shoulder),), distance=distance)
+    quarter = mesh_outline(outline, _even(_even(size, across), along), seed=seed)
+    return completed(completed(quarter, "axis", across), "waist", along, {"top": "bottom"})
 
 
 def cylindrical_shell_mesh(*, inner_radius: float = 1.9, thickness: float = 0.1, length: float = 5.0,
                            notch: float = 1.0, notch_width: float = 0.1, h: float = 0.025, h_coarse: float = 0.11,
-                           half_height: float = 1.2, seed: int = 0) -> meshio.Mesh:
+                           half_height: float = 1.2, distance: Distance | None = None,
+                           seed: int = 0) -> meshio.Mesh:
     """Mesh the unrolled mid-surface of a half cylinder, [0, pi r] x [0, length], with a slit in its middle.
 
     r is the mean radius; x is the arc and y the axis of the cylinder. The slit is `notch` long from tip to tip, along
@@ -141,8 +154,12 @@ def cylindrical_shell_mesh(*, inner_radius: float = 1.9, thickness: float = 0.1,
                Edge("notch", (tip + r, middle + r), via=(tip, middle)), Edge("notch", (crown, middle + r)),
                Edge("seam", (crown, length)), Edge("top", (0, length)), Edge("edge", (0, 0))]
     corridor = (0.0, arc, middle - half_height, middle + half_height)
-    half = mesh_outline(outline, SizeField(h, h_coarse, (corridor,)), seed=seed)
-    return completed(half, "seam", lambda p: p * (-1, 1) + (arc, 0))
+
+    def image(points: np.ndarray) -> np.ndarray:
+        return points * (-1, 1) + (arc, 0)
+
+    half = mesh_outline(outline, _even(SizeField(h, h_coarse, (corridor,), distance=distance), image), seed=seed)
+    return completed(half, "seam", image)
 
 
 # --- outlines ---
@@ -190,9 +207,32 @@ def _left_half(side: float, notch: float, width: float, y: float) -> list[Edge]:
             *_notch_from_left(notch, width, y), Edge("left", (0, 0))]
 
 
-def _edge_notched(side: float, notch: float, width: float, size: SizeField, seed: int) -> meshio.Mesh:
+def _even(size: SizeField, image: Image) -> SizeField:
+    """The size field with the symmetry `image` of a mesh: a corridor is laid along the image of a path as well."""
+    distance = size.distance
+    if distance is None:
+        return size
+
+    def nearer(x: float, y: float) -> float:
+        return min(distance(x, y), distance(*image(np.array([[x, y]]))[0].tolist()))
+
+    return replace(size, distance=nearer)
+
+
+def _edge_notched(side: float, notch: float, width: float, size: SizeField, symmetry: str, seed: int) -> meshio.Mesh:
+    """Square plate with a notch from the left edge at mid-height; with `symmetry` "mirror" of equal halves."""
+    middle, r = side / 2, width / 2
+    if symmetry == "mirror":
+        def image(points: np.ndarray) -> np.ndarray:
+            return points * (1, -1) + (0, side)
+
+        s = r * math.sqrt(0.5)
+        lower = [Edge("bottom", (side, 0)), Edge("right", (side, middle)), Edge("seam", (notch, middle)),
+                 Edge("notch", (notch - r, middle - r), via=(notch - r + s, middle - s)),
+                 Edge("notch", (0, middle - r)), Edge("left", (0, 0))]
+        return completed(mesh_outline(lower, _even(size, image), seed=seed), "seam", image, {"bottom": "top"})
     outline = [Edge("bottom", (side, 0)), Edge("right", (side, side)), Edge("top", (0, side)),
-               *_notch_from_left(notch, width, side / 2), Edge("left", (0, 0))]
+               *_notch_from_left(notch, width, middle), Edge("left", (0, 0))]
     return mesh_outline(outline, size, seed=seed)
 
 
@@ -205,7 +245,7 @@ def _double_edge_notched(side: float, notch: float, width: float, offset: float,
         return side - points
 
     if symmetry == "turn":
-        half = mesh_outline(_left_half(side, notch, width, left), size, seed=seed, image=turned)
+        half = mesh_outline(_left_half(side, notch, width, left), _even(size, turned), seed=seed, image=turned)
         return completed(half, "seam", turned, {"left": "right", "top": "bottom", "bottom": "top"})
     r, tip = width / 2, side - notch
     return mesh_outline(
@@ -228,7 +268,8 @@ class Shape(NamedTuple):
 # 50,847 in Sec. 5.2, 28,531 in Sec. 5.4, 82,382 hexahedra in Sec. 5.5 and 53,122 in Sec. 5.6, in two layers each.
 SHAPES: dict[str, Shape] = {
     "single_edge_notch": Shape(single_edge_notch_mesh, {
-        "coarse": {"h": 0.1 / 1.5}, "M3": {"h": 0.0331}, "M4": {"h": 0.02505}, "M5": {"h": 0.0202}}),
+        "coarse": {"h": 0.1 / 1.5}, "M3": {"h": 0.0331}, "M4": {"h": 0.02505}, "M5": {"h": 0.0202},
+        "coarse-mirror": {"h": 0.064, "symmetry": "mirror"}, "M3-mirror": {"h": 0.0331, "symmetry": "mirror"}}),
     "simple_shear": Shape(simple_shear_mesh, {
         "coarse": {"h": 0.025, "half_width": 0.4}, "M4": {"h": 0.025, "half_width": 1.0},
         "paper": {"h": 0.01765, "half_width": 4.0}}),

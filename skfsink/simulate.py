@@ -17,6 +17,7 @@ from .hht import HHT
 from .momentum import Momentum
 from .progress import Display, Interrupt
 from .recorder import Recorder
+from .rest import LoadingFromRest
 from .scene import Scene
 from .state import State
 from .statics import Statics
@@ -57,7 +58,7 @@ class Simulation:
         c, space = scene.controls, scene.sample.space
         self.free, self.grip_velocity = scene.constraints()
         self.momentum = Momentum(space, scene.material, c.element, c.force_floor)
-        self.density = DensitySolver(space, scene.sink_law, c.sink)
+        self.density = DensitySolver(space, scene.sink_law, c.sink, active_zone=c.active_zone)
         self.statics = Statics(self.momentum, self.density, self.free, self.grip_velocity, c.statics, c.deletion,
                                c.threads)
         self.recorder = Recorder(scene, folder, self.momentum, self.density,
@@ -65,6 +66,7 @@ class Simulation:
         self.notes = Notes(display.say, stored[2].get("warnings", []) if stored else [])
         self.state = State.intact(space)
         self.integrator: Explicit | HHT | None = None
+        self._from_rest: LoadingFromRest | None = None
         self.wall = {"loading": 0.0, "event": 0.0, "output": 0.0}
         self.counts = {"steps": 0, "gamma_solves": 0, "factorisations": 0}
         self._saved = self._clock = time.perf_counter()
@@ -101,11 +103,14 @@ class Simulation:
         state = self.state
         tolerance = self.scene.controls.statics.onset_tolerance
         started = False
-        for _ in self.statics.load(state):
+        if self.scene.controls.start == "rest" and self._from_rest is None:
+            self._make_integrator()
+        loading: LoadingFromRest | Statics = self._from_rest or self.statics
+        for _ in loading.load(state):
             reaction = self.momentum.force(state.u)
             self.recorder.loading(state, reaction)
             started = True
-            done = 0.5 * min(1.0, tolerance * state.grip / self.statics.increment) ** 0.25
+            done = 0.5 * min(1.0, tolerance * state.grip / loading.increment) ** 0.25
             self.display.update(done, f"grips {state.grip * self.scene.speed:.4f} mm  load "
                                       f"{self.recorder.load(reaction):.4f} N/mm  least γ {state.gamma.min():.3f}")
             self._pause("loading")
@@ -122,8 +127,8 @@ class Simulation:
         self.recorder.reached_onset(onset, reaction)
 
     def _begin_event(self) -> None:
-        """Scale the state just past the onset, and start a new ledger there."""
-        state, factor = self.state, 1.0 + self.scene.controls.overshoot
+        """Start a new ledger at the onset, from rest just past it unless the body has come there in motion."""
+        state, factor = self.state, 1.0 + (0.0 if self._from_rest else self.scene.controls.overshoot)
         state.u *= factor
         state.grip *= factor
         state.time, state.step, state.phase = 0.0, 0, "event"
@@ -134,6 +139,8 @@ class Simulation:
             state.ledger.initial = state.ledger.elastic = self.momentum.energy
         else:
             self.statics.newton.release()
+            if isinstance(self.integrator, HHT):
+                self.counts["factorisations"] += self.integrator.solver.count
             self._make_integrator()
             assert self.integrator is not None
             self.integrator.begin(state)
@@ -141,7 +148,11 @@ class Simulation:
 
     def _make_integrator(self) -> None:
         c = self.scene.controls
-        if c.integrator == "explicit":
+        if self.state.phase == "loading":
+            self._from_rest = LoadingFromRest(self.momentum, self.density, self.free, self.grip_velocity, c.hht,
+                                              c.deletion, c.threads)
+            self.integrator = self._from_rest.integrator
+        elif c.integrator == "explicit":
             self.integrator = Explicit(self.momentum, self.density, self.free, self.grip_velocity, c.explicit,
                                        c.deletion)
         else:

@@ -9,7 +9,7 @@ import numpy as np
 
 from .errors import require
 
-__all__ = ["rolled", "swept"]
+__all__ = ["rolled", "swept", "unrolled"]
 
 Map = Callable[[np.ndarray], np.ndarray]
 
@@ -55,5 +55,15 @@ def rolled(inner_radius: float, thickness: float) -> Map:
     def place(points: np.ndarray) -> np.ndarray:
         r, phi = inner_radius + points[:, 2], points[:, 0] / mean
         return np.column_stack([r * np.cos(phi), r * np.sin(phi), points[:, 1]])
+
+    return place
+
+
+def unrolled(inner_radius: float, thickness: float) -> Map:
+    """Map from the half cylinder back to its section: points (n, 3) to x along the mean arc and y along the axis."""
+    mean = inner_radius + thickness / 2
+
+    def place(points: np.ndarray) -> np.ndarray:
+        return np.column_stack([mean * np.arctan2(points[:, 1], points[:, 0]), points[:, 2]])
 
     return place

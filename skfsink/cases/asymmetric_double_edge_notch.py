@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 from ..errors import require
+from ..layout import arrange
 from ..options import SAMPLE, Options
 from ..result import Result
 from ..run import run_case
-from ..sample import shape_sample
 from ..scene import Grip, Scene
 from ..shapes import check_two_notches
 
@@ -67,10 +67,11 @@ def _scene(own: dict[str, Any], options: Options) -> Scene:
     speed = options.speed
     return Scene(
         case="asymmetric_double_edge_notch", title="Asymmetric double-edge notched plate",
-        parameters={**own, **options.parameters()}, sample=shape_sample("asymmetric_double_edge_notch", own),
-        material=options.material(), sink_law=options.sink_law(),
-        grips=(Grip("top", (0.0, speed)), Grip("bottom", (0.0, -speed))),
-        controls=options.controls(), assumed=ASSUMED)
+        parameters={**own, **options.parameters()}, material=options.material(), sink_law=options.sink_law(),
+        controls=options.controls(), assumed=ASSUMED,
+        **arrange("asymmetric_double_edge_notch", own, options,
+                  (Grip("top", (0.0, speed)), Grip("bottom", (0.0, -speed))),
+                  asymmetry="it is symmetric by half a turn, which no boundary can hold"))
 
 
 if __name__ == "__main__":

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any
 
 from ..errors import require
+from ..halving import Mirror
+from ..layout import arrange
 from ..options import SAMPLE, Options
 from ..result import Result
 from ..run import run_case
-from ..sample import shape_sample
 from ..scene import Grip, Scene
 from ..shapes import check_shell
-from ..sweeping import rolled, swept
+from ..sweeping import rolled, swept, unrolled
 
 __all__ = ["cylindrical_shell"]
 
@@ -72,12 +74,12 @@ def _scene(own: dict[str, Any], options: Options) -> Scene:
     speed = options.speed
     return Scene(
         case="cylindrical_shell", title="Cylindrical shell", parameters={**own, **options.parameters()},
-        sample=shape_sample("cylindrical_shell", own,
-                            lambda section: swept(section, thickness, own["layers"], rolled(radius, thickness))),
-        material=options.material(), sink_law=options.sink_law(),
-        grips=(Grip("top", (0.0, 0.0, speed)), Grip("bottom", (0.0, 0.0, -speed))), faces=("back", "front"),
-        view=(80.0, 25.0),
-        controls=options.controls(), assumed=ASSUMED)
+        material=options.material(), sink_law=options.sink_law(), controls=options.controls(), assumed=ASSUMED,
+        view=(80.0, 25.0), flat=unrolled(radius, thickness),
+        **arrange("cylindrical_shell", own, options,
+                  (Grip("top", (0.0, 0.0, speed)), Grip("bottom", (0.0, 0.0, -speed))), faces=("back", "front"),
+                  lift=lambda section: swept(section, thickness, own["layers"], rolled(radius, thickness)),
+                  mirrors=(Mirror(0, math.pi / 2 * (radius + thickness / 2)),)))
 
 
 if __name__ == "__main__":

@@ -8,10 +8,11 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 from ..errors import require
+from ..halving import Mirror
+from ..layout import arrange
 from ..options import SAMPLE, Options
 from ..result import Result
 from ..run import run_case
-from ..sample import shape_sample
 from ..scene import Grip, Scene
 from ..shapes import check_dog_bone
 from ..sweeping import swept
@@ -78,12 +79,12 @@ def _scene(own: dict[str, Any], options: Options) -> Scene:
     speed, plane = options.speed, options.element == "planestress"
     along, back = ((0.0, v) if plane else (0.0, v, 0.0) for v in (speed, -speed))
     return Scene(
-        case="dog_bone", title="Dog-bone", parameters={**own, **options.parameters()},
-        sample=shape_sample("dog_bone", own,
-                            None if plane else lambda section: swept(section, own["thickness"], own["layers"])),
-        material=options.material(), sink_law=options.sink_law(),
-        grips=(Grip("top", along), Grip("bottom", back)),
-        faces=() if plane else ("back", "front"), view=(-90.0, 70.0), controls=options.controls(), assumed=ASSUMED)
+        case="dog_bone", title="Dog-bone", parameters={**own, **options.parameters()}, material=options.material(),
+        sink_law=options.sink_law(), controls=options.controls(), assumed=ASSUMED, view=(-90.0, 70.0),
+        **arrange("dog_bone", own, options, (Grip("top", along), Grip("bottom", back)),
+                  lift=None if plane else lambda section: swept(section, own["thickness"], own["layers"]),
+                  faces=() if plane else ("back", "front"), mirrors=(Mirror(0, 0.0), Mirror(1, 0.0)),
+                  thickness=own["thickness"] if plane else 1.0))
 
 
 if __name__ == "__main__":

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
+from ..layout import arrange
 from ..options import SAMPLE, Options
 from ..result import Result
 from ..run import run_case
-from ..sample import shape_sample
 from ..scene import Grip, Scene, choose
 from ..shapes import check_plate
 
@@ -64,9 +64,9 @@ def _scene(own: dict[str, Any], options: Options) -> Scene:
     height = None if choose("top", own["top"], ("free", "held")) == "free" else 0.0
     return Scene(
         case="simple_shear", title="Simple shear", parameters={**own, **options.parameters()},
-        sample=shape_sample("simple_shear", own), material=options.material(), sink_law=options.sink_law(),
-        grips=(Grip("top", (options.speed, height)), Grip("bottom", (0.0, 0.0))),
-        controls=options.controls(), assumed=ASSUMED)
+        material=options.material(), sink_law=options.sink_law(), controls=options.controls(), assumed=ASSUMED,
+        **arrange("simple_shear", own, options, (Grip("top", (options.speed, height)), Grip("bottom", (0.0, 0.0))),
+                  asymmetry="its halves are stretched and compressed"))
 
 
 if __name__ == "__main__":

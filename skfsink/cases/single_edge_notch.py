@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
+from ..halving import Mirror
+from ..layout import arrange
 from ..options import SAMPLE, Options
 from ..result import Result
 from ..run import run_case
-from ..sample import shape_sample
 from ..scene import Grip, Scene
 from ..shapes import check_plate
 
@@ -38,7 +39,8 @@ def single_edge_notch(*, side: Annotated[float, SAMPLE] = 4.0, notch: Annotated[
     notch_width
         Width of the notch [mm], in (0, side).
     mesh
-        "coarse", "M3", "M4", "M5" (element size l/1.5, l/3, l/4, l/5), or the path of a mesh file.
+        "coarse", "M3", "M4", "M5" (element size l/1.5, l/3, l/4, l/5), "coarse-mirror", "M3-mirror" (of equal halves),
+        or the path of a mesh file.
     mesh_seed
         Another mesh of the same sizes for each number; other than 0 it needs gmsh (the mesh extra).
     options
@@ -58,9 +60,9 @@ def _scene(own: dict[str, Any], options: Options) -> Scene:
     speed = options.speed
     return Scene(
         case="single_edge_notch", title="Single-edge notched plate", parameters={**own, **options.parameters()},
-        sample=shape_sample("single_edge_notch", own), material=options.material(), sink_law=options.sink_law(),
-        grips=(Grip("top", (0.0, speed)), Grip("bottom", (0.0, -speed))),
-        controls=options.controls(), assumed=ASSUMED)
+        material=options.material(), sink_law=options.sink_law(), controls=options.controls(), assumed=ASSUMED,
+        **arrange("single_edge_notch", own, options, (Grip("top", (0.0, speed)), Grip("bottom", (0.0, -speed))),
+                  mirrors=(Mirror(1, own["side"] / 2, along=True),)))
 
 
 if __name__ == "__main__":

@@ -1,0 +1,67 @@
+"""Loading from rest: the unloaded body is set in motion by its grips, and its dynamics followed to the onset.
+
+Waves cross the body thousands of times while slow grips load it, so that the explicit scheme would take 10^9 steps. The
+implicit one takes steps as long as the two fields converge in them, and those that do not are halved: first with the
+distance to the limit load, then with the growth of the instability. Where a step has become so short that a shear wave
+no longer crosses the body in two of them, the event begins: state, velocities and accelerations are handed over.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from .density import DensitySolver
+from .hht import HHT, HHTControls
+from .momentum import Momentum
+from .state import State
+
+__all__ = ["LoadingFromRest"]
+
+
+class LoadingFromRest:
+    """Brings a state from rest to the onset by the implicit scheme.
+
+    Parameters
+    ----------
+    momentum, density: the two fields.
+    free: (n*dim,) mask of the degrees of freedom that no grip holds.
+    grip_velocity: (n, dim) velocity of the held ones [mm/s].
+    controls: options of the event; damping and mass are taken from it.
+    deletion: gamma at which an element fails.
+
+    Attributes
+    ----------
+    integrator: the implicit scheme, whose memory belongs into a checkpoint.
+    """
+
+    INCREMENT = 0.002    # largest step, as displacement of a grip over the size of the body
+    TOLERANCE = 1e-4     # of forces and of gamma: what is left is the kick the event begins with
+    ITERATIONS = 200     # the coupling of the fields converges ever more slowly towards the limit load
+    HANDOVER = 0.5       # step at which the event begins, in transits of a shear wave through the body
+
+    def __init__(self, momentum: Momentum, density: DensitySolver, free: np.ndarray, grip_velocity: np.ndarray,
+                 controls: HHTControls, deletion: float = 1e-6, threads: int = 1) -> None:
+        size = float(np.ptp(momentum.space.X, axis=0).max())
+        self._last = self.HANDOVER * size / (momentum.material.shear_wave_speed * 1e3)
+        longest = max(self.INCREMENT * size / float(np.abs(grip_velocity).max()), 2 * self._last)
+        self.integrator = HHT(momentum, density, free, grip_velocity, replace(
+            controls, coupling="iterated", dt=longest, dt_first=0.0, force_tolerance=self.TOLERANCE,
+            correction_tolerance=2 * self.TOLERANCE, gamma_tolerance=self.TOLERANCE, max_iterations=self.ITERATIONS),
+            deletion, threads)
+        self.integrator.loading = True
+
+    @property
+    def increment(self) -> float:
+        """The next step [s]."""
+        return self.integrator.dt
+
+    def load(self, state: State) -> Iterator[State]:
+        """Load `state` to the onset, yielding it after each step; the last one is the onset."""
+        if state.step == 0:
+            self.integrator.begin(state)
+        while self.integrator.dt > self._last:
+            self.integrator.step(state)
+            yield state
