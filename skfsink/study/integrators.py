@@ -8,7 +8,6 @@ not fall smoothly: those of a method are root mean squares over three meshes of 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -111,13 +110,13 @@ def errors(point: dict[str, Any], reference: dict[str, Any]) -> dict[str, float]
             "history": float(np.sqrt(np.mean((passed - true) ** 2))) / reference["arrival_us"]}
 
 
-def summary(points: Points, quick_methods: Sequence[Method] | None = None) -> list[dict[str, Any]]:
+def summary(points: Points) -> list[dict[str, Any]]:
     """A row a method: name, family, line, cost, errors (root mean squares over the plates) or why it failed."""
     plates = sorted({key.split("/")[1] for key in points if key.startswith("onset/")})
     courants = sorted({float(key.split("/")[0].split()[1]) for key in points if key.startswith("reference ")})
     references = {plate: points[f"reference {courants[0]:g}/{plate}"] for plate in plates}
     rows = [Method(f"reference {c:g}", "reference", "", ExplicitControls()) for c in reversed(courants[1:])]
-    rows += quick_methods or [method for method in methods(False) if f"{method.name}/{plates[0]}" in points]
+    rows += [method for method in methods(False) if f"{method.name}/{plates[0]}" in points]
     found = []
     for method in rows:
         runs = {plate: points[f"{method.name}/{plate}"] for plate in plates}
@@ -140,6 +139,8 @@ def draw(points: Points, path: Path) -> None:
         for ax, (name, label) in zip(axes, ERRORS.items()):
             panel(ax, rows, name)
             ax.set_ylabel(f"relative error of the {label}")
+        handles, labels = axes[0].get_legend_handles_labels()
+        axes[0].figure.legend(handles, labels, loc="outside right upper", fontsize=6)
 
 
 #: colour and marker of each family, by line

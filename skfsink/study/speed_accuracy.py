@@ -92,6 +92,7 @@ def run_parts(store: Store, parts: list[Part], quick: bool, display: Display) ->
         display.update(1.0, "")
     if {"time", "space"} <= found.keys():
         draw_headline(found["time"], found["space"], folder / f"{store.study}.png")
+    store.save()  # with the command that made it complete
     tables = [f"## {part.name}\n\n" + "\n".join(part.table(found[part.name])) + "\n" for part in parts]
     write_atomic(folder / f"{store.study}.md", "\n".join(tables))
 
