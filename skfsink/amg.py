@@ -87,7 +87,7 @@ class AmgCG:
 
     def dead(self, D: np.ndarray) -> np.ndarray:
         """Mask of the unknowns whose sink has grown so far that the coarse level leaves them out."""
-        return D >= self.DEAD * self._diagonal0
+        return self.DEAD * self._diagonal0 <= D
 
     def solve(self, A: csr_array, D: np.ndarray, b: np.ndarray, x: np.ndarray, tolerance: float | None = None,
               size: float | None = None) -> np.ndarray | None:

@@ -103,6 +103,8 @@ class Explicit:
     GAMMA_MOST = 20  # steps between them at the most, lest a failing element that shortens the step keeps failing
     GAMMA_TOLERANCE = 1e-6  # relative residual of a solve for gamma
     CHECK = 5        # steps between looks at the cheap indicator
+    RISEN = 25       # steps after which a risen indicator calls for an estimate; until then the step follows it
+    FALLEN = 100     # steps after which a fallen one does; until then the step is shorter than it need be
     FED_IN = 1e-6    # energy a step may feed in before omega_max is estimated at once, of the initial energy
 
     def __init__(self, momentum: Momentum, density: DensitySolver, free: np.ndarray, grip_velocity: np.ndarray,
@@ -193,13 +195,8 @@ class Explicit:
             return
         failed = delete_failed(self.space, state, self.deletion, self.density.law.failure_energy)
         left = left_in(momentum, state.gamma, failed) if failed.size else 0.0
-        before, mass = momentum.gamma, self.mass
-        momentum.set_gamma(state.gamma, state.deleted)
-        self.mass = momentum.lumped_mass(self.controls.mass_floor)
-        taken = momentum.tiles.tile(self.space.w * (before - momentum.gamma))
-        used = self.space.n_elements - (momentum.tiles.count - 1) * taken.shape[2]
-        taken[-1, :, used:] = 0.0
-        stored = float(np.vdot(taken, self._W))
+        stored = momentum.set_gamma(state.gamma, state.deleted)
+        mass, self.mass = self.mass, momentum.lumped_mass(self.controls.mass_floor)
         ledger.sink_stored += stored - left
         ledger.deletion += left
         ledger.sink_kinetic += 0.5 * float((mass - self.mass) @ np.einsum("ai,ai->a", state.v, state.v))
@@ -228,8 +225,9 @@ class Explicit:
         c = self.controls
         indicator = self._indicator(state.u)
         ratio = indicator / self._indicator0 if self._indicator0 > 0 else np.inf
-        due = state.step - self._last_estimate >= c.estimate_every
-        if self._mode is None or self._urgent or due or abs(ratio - 1) > 2 * c.estimate_change:
+        since = state.step - self._last_estimate
+        moved = abs(ratio - 1) > 2 * c.estimate_change and since >= (self.RISEN if ratio > 1 else self.FALLEN)
+        if self._mode is None or self._urgent or moved or since >= c.estimate_every:
             self._omega, self._mode = highest_frequency(self.momentum, self._pattern, self.free, state.u, self.mass,
                                                         self._mode)
             self._omega = max(self._omega, indicator**0.5)  # a Rayleigh quotient, in case Lanczos missed that element

@@ -30,29 +30,43 @@ class Momentum:
     element: "jbar" for the element-constant J_bar, "plain" for the standard element, "planestress" for a thin sheet of
         quadrilaterals, whose forces, energies and masses are per mm of undeformed thickness as in plane strain.
     force_floor: Gauss points with gamma below this exert no force. Their stiffness and mass are then gone together.
+    threads: that share the loops over elements; results do not depend on their number.
 
     Attributes
     ----------
-    gamma: effective relative density at the Gauss points, zero in deleted elements and below the floor, (ne, nq).
     energy: gamma-weighted stored energy at the last evaluation [N mm; N mm/mm in 2D].
     least_J: least J (plane stress: its part in the plane) at a Gauss point with gamma > 0 at the last evaluation.
     evaluations: how often the force was evaluated.
     """
 
-    def __init__(self, space: Space, material: Material, element: str = "jbar", force_floor: float = 1e-3) -> None:
+    def __init__(self, space: Space, material: Material, element: str = "jbar", force_floor: float = 1e-3,
+                 threads: int = 1) -> None:
         if element not in ELEMENTS:
             raise ParameterError(f"element must be one of {', '.join(ELEMENTS)}; got {element!r}")
         check_element(element, space)
         self.space, self.material, self.force_floor = space, material, force_floor
         self.j_bar = element == "jbar"
         self.plane_stress = element == "planestress"
-        self.tiles = kernels.Tiles(space, self.plane_stress)
+        self.tiles = kernels.Tiles(space, self.plane_stress, threads)
         self.energy = 0.0
         self.least_J = 1.0
         self.evaluations = 0
         self._constants = material.constants
-        self.gamma = np.ones_like(space.w)
-        self.tiles.set_gamma(self.gamma)
+        self._intact = space.lump(np.ones_like(space.w)) * material.rho0
+        self._gamma: np.ndarray | None = np.ones_like(space.w)
+        self.tiles.set_gamma(self._gamma)
+
+    @property
+    def gamma(self) -> np.ndarray:
+        """Effective relative density at the Gauss points, zero in deleted elements and below the floor, (ne, nq)."""
+        if self._gamma is None:
+            self._gamma = self.tiles.untile(self.tiles.gamma)
+        return self._gamma
+
+    @gamma.setter
+    def gamma(self, gamma: np.ndarray) -> None:
+        """Only for tangents and masses; forces keep what :meth:`set_gamma` gave."""
+        self._gamma = gamma
 
     def effective(self, gamma: np.ndarray, deleted: np.ndarray) -> np.ndarray:
         """Relative density the force sees (ne, nq), for nodal values `gamma` (n,) and `deleted` elements (ne,)."""
@@ -60,10 +74,13 @@ class Momentum:
         at_gauss[(at_gauss < self.force_floor) | deleted[:, None]] = 0.0
         return at_gauss
 
-    def set_gamma(self, gamma: np.ndarray, deleted: np.ndarray) -> None:
-        """Use the nodal relative density `gamma` from now on."""
-        self.gamma = self.effective(gamma, deleted)
-        self.tiles.set_gamma(self.gamma)
+    def set_gamma(self, gamma: np.ndarray, deleted: np.ndarray) -> float:
+        """Use the nodal relative density `gamma` (n,) and the `deleted` elements (ne,) from now on.
+
+        Returns the energy [N mm; N mm/mm in 2D] that its fall takes from the stored energy last evaluated.
+        """
+        self._gamma = None
+        return self.tiles.relax(gamma, deleted, self.force_floor)
 
     def force(self, u: np.ndarray, out: np.ndarray | None = None) -> np.ndarray:
         """Internal force at the displacement `u`, (n, dim) [N; N/mm in 2D]. Sets `energy`, `least_J` and `W`."""
@@ -103,5 +120,4 @@ class Momentum:
 
     def lumped_mass(self, floor: float) -> np.ndarray:
         """Row sums (n,) [t; t/mm in 2D] of Eq. (28), at least `floor` times those of the intact solid."""
-        intact = self.space.lump(np.ones_like(self.gamma)) * self.material.rho0
-        return np.maximum(self.space.lump(self.gamma) * self.material.rho0, floor * intact)
+        return np.maximum(self.space.lump(self.gamma) * self.material.rho0, floor * self._intact)

@@ -90,7 +90,7 @@ class ActiveZone:
 
     @staticmethod
     def _sources(magnitude: np.ndarray, negligible: float) -> np.ndarray:
-        """Mask of the nodes with the largest residuals, such that the others together have a norm below `negligible`."""
+        """Mask of the nodes with the largest residuals, such that the others have a norm below `negligible`."""
         level = 0.3 * float(magnitude.max())
         while True:
             sources = magnitude > level
@@ -102,7 +102,8 @@ class ActiveZone:
         """Choose the zone around `sources` (mask)."""
         self.choices += 1
         self._from = sources
-        distance = cKDTree(self._X[sources]).query(self._X, distance_upper_bound=(self.RADIUS + self.MARGIN) * self._l)[0]
+        furthest = (self.RADIUS + self.MARGIN) * self._l
+        distance, _ = cKDTree(self._X[sources]).query(self._X, distance_upper_bound=furthest)
         self._core = distance <= self.MARGIN * self._l
         self.nodes = np.flatnonzero(np.isfinite(distance))
         self._inner = None

@@ -12,16 +12,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import numba
 import numpy as np
 from numba import njit
 
 from ..material import CompiledLaw
 from ..space import Space
-from .force2d import force_2d
-from .force3d import force_3d
 from .lanes import LANES, LANES_3D
-from .plane_stress import force_plane_stress, stiffness_plane_stress
-from .volumetric import volumetric_2d, volumetric_3d
+from .plane_stress import stiffness_plane_stress
+from .relax import relax
+from .shared import FORCES, VOLUMETRIC
 
 __all__ = ["Tiles"]
 
@@ -35,9 +35,12 @@ class Tiles:
     W: stored energy density of Eq. (31) [MPa] at the last evaluation, tiled.
     psi: gamma-weighted stored energy of each element [N mm, or N mm/mm in 2D] at the last evaluation, (tiles, lanes).
     lanes: elements in a tile.
+
+    The loops over tiles are shared by `threads` threads, those of the machine at the most; results do not depend on
+    their number.
     """
 
-    def __init__(self, space: Space, plane_stress: bool = False) -> None:
+    def __init__(self, space: Space, plane_stress: bool = False, threads: int = 1) -> None:
         self.space = space
         ne, na, dim = space.n_elements, space.conn.shape[1], space.dim
         self.lanes = LANES if dim == 2 else LANES_3D
@@ -49,9 +52,8 @@ class Tiles:
         self.W = np.zeros((self.count, na, self.lanes))
         self.psi = np.zeros((self.count, self.lanes))
         self._force = np.zeros((self.count, na * dim, self.lanes))
-        self._kernel: Callable[..., float] = force_2d if dim == 2 else force_3d
-        if plane_stress:
-            self._kernel = force_plane_stress
+        self._kernels = FORCES[0 if plane_stress else dim]
+        self.threads = min(threads, numba.config.NUMBA_NUM_THREADS)
         start, entry = space.incidence
         element, local = np.divmod(entry, na)
         tile, lane = np.divmod(element, self.lanes)
@@ -74,6 +76,15 @@ class Tiles:
         used = self.space.n_elements - (self.count - 1) * self.lanes
         self.gamma[-1, :, used:] = 0.0
 
+    def relax(self, nodal: np.ndarray, deleted: np.ndarray, floor: float) -> float:
+        """Give the force loops the Q1 field with nodal values (n,), zero below `floor` and in `deleted` elements (ne,).
+
+        Returns the energy [N mm, or N mm/mm in 2D] its fall takes from the stored energy of the last evaluation.
+        """
+        gone = np.ones((self.count, self.lanes), bool)
+        gone.reshape(-1)[:deleted.size] = deleted
+        return float(relax(self.conn, nodal, self.space.N, gone, floor, self.geometry, self.W, self.gamma))
+
     def force(self, x: np.ndarray, law: CompiledLaw, constants: np.ndarray, bulk_modulus: float,
               out: np.ndarray, j_bar: bool = True) -> float:
         """Internal force (Eq. 17) at the positions `x` (n, dim) [mm] into `out` (n, dim) [N, or N/mm in 2D].
@@ -81,18 +92,27 @@ class Tiles:
         Fills `W` and `psi`, and returns the least J at a Gauss point with gamma > 0. `j_bar=False` takes J instead of
         its element mean (the plain element, which locks).
         """
-        least = self._kernel(law, constants, bulk_modulus, self.conn, x, self.geometry, self.gamma, j_bar,
-                             self._force, self.W, self.psi)
+        least = min(self._share(self._kernels, law, constants, bulk_modulus, self.conn, x, self.geometry, self.gamma,
+                                j_bar, self._force, self.W, self.psi))
         _sum_at_nodes(self._force.reshape(-1), self._start, self._offset, self.lanes, out)
-        return float(least)
+        return least
+
+    def _share(self, loops: tuple[Callable[..., float], Callable[..., None]], *arguments: object) -> list[float]:
+        """What the threads' shares of a loop return."""
+        single, shared = loops
+        if self.threads == 1:
+            return [float(single(*arguments))]
+        numba.set_num_threads(self.threads)
+        results = np.empty(self.threads)
+        shared(*arguments, results)
+        return [float(result) for result in results]
 
     def volumetric(self, x: np.ndarray, inverse_mass: np.ndarray) -> float:
         """Greatest gamma_bar V |b|^2_(1/m) of an element, b = dJ_bar/du, at `x`; times k a frequency squared [1/s^2].
 
         `inverse_mass` (n, dim) is zero where a degree of freedom is held.
         """
-        loop = volumetric_2d if self.space.dim == 2 else volumetric_3d
-        return float(loop(self.conn, x, self.geometry, self.gamma, inverse_mass))
+        return max(self._share(VOLUMETRIC[self.space.dim], self.conn, x, self.geometry, self.gamma, inverse_mass))
 
     def plane_stiffness(self, x: np.ndarray, law: CompiledLaw, constants: np.ndarray, bulk_modulus: float,
                         inverse_mass: np.ndarray) -> float:
