@@ -71,6 +71,7 @@ class Statics:
     deletion: gamma at which an element fails.
     """
 
+    STALLED = 0.9  # factor of the changes of gamma a pass from which on the load is within 0.1 % of the onset
     SNAP = 400  # Newton steps in a sweep: the body may snap to a shape far away
 
     def __init__(self, momentum: Momentum, density: DensitySolver, free: np.ndarray, grip_velocity: np.ndarray,
@@ -223,7 +224,7 @@ class Statics:
 
     def _doubt(self) -> None:
         """Say so where the onset is not where the sink runs away."""
-        if self.refused == "passes":
+        if self.refused == "passes" and self.factor < self.STALLED:
             log.warning("the onset may be too low: the last load increment was given up after %d passes over the two "
                         "fields while the change of gamma still fell (by a factor of %.3f a pass); raise max_passes",
                         self.controls.max_passes, self.factor)

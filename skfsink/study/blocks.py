@@ -11,41 +11,49 @@ from ..space import Space
 __all__ = ["block", "surface", "trapezium"]
 
 
-def block(n: int, *, notch: float = 0.0, width: float = 0.0, distortion: float = 0.0, seed: int = 0) -> Sample:
+def block(n: int, *, notch: float = 0.0, width: float = 0.0, rounded: bool = False, distortion: float = 0.0,
+          seed: int = 0) -> Sample:
     """Square of 1 mm of n x n elements with the boundaries `top`, `bottom` and, if it has one, `notch`.
 
-    The notch enters at mid-height from the left, is `notch` [mm] long and `width` [mm] wide, cut out of the elements;
-    0 is a slit between two rows of them (n even). `distortion` moves inner nodes at random by up to that part of h.
+    The notch enters at mid-height from the left, is `notch` [mm] long and `width` [mm] wide, cut out of rows of
+    elements; 0 is a slit between two of them (n even). Its end is square, or a half circle if `rounded`. `distortion`
+    moves inner nodes at random by up to that part of 1/n.
     """
-    line = np.linspace(0.0, 1.0, n + 1)
-    mesh = skfem.MeshQuad.init_tensor(line, line)
+    across, beside = max(round(width * n), 1), max(round((1 - width) / 2 * n), 1)
+    inside = 0.5 * width * np.sin(np.linspace(-0.5, 0.5, across + 1) * np.pi) if rounded else np.zeros(0)
+    y_lines = np.linspace(0.0, 1.0, n + 1)
+    if rounded:
+        y_lines = np.concatenate([np.linspace(0, 0.5 - width / 2, beside + 1), 0.5 + inside[1:-1],
+                                  np.linspace(0.5 + width / 2, 1, beside + 1)])
+    mesh = skfem.MeshQuad.init_tensor(np.linspace(0.0, 1.0, n + 1), y_lines)
     p, t = mesh.p.copy(), mesh.t.copy()
     x, y = p[:, t].mean(axis=1)
-    tip = np.zeros(p.shape[1], bool)
+    tip = (p[0] < notch + 1e-9) & (np.abs(p[1] - 0.5) < width / 2 + 1e-9)
     if notch > 0 and width > 0:
         t = t[:, ~((x < notch) & (np.abs(y - 0.5) < width / 2))]
-        tip = (p[0] < notch + 1e-9) & (np.abs(p[1] - 0.5) < width / 2 + 1e-9)
     elif notch > 0:
-        tip = (p[0] < notch + 1e-9) & np.isclose(p[1], 0.5)
-        lips = np.flatnonzero(tip & (p[0] < notch - 1e-9))
+        lips = np.flatnonzero(tip & (p[0] < p[0, tip].max() - 1e-9))
         double = np.arange(p.shape[1])
         double[lips] = p.shape[1] + np.arange(lips.size)
-        p = np.hstack([p, p[:, lips]])
+        p, tip = np.hstack([p, p[:, lips]]), np.append(tip, np.ones(lips.size, bool))
         above = y > 0.5
         t[:, above] = double[t[:, above]]
-        tip = np.append(tip, np.ones(lips.size, bool))
+    if rounded:
+        end = p[0, tip].max()
+        off = np.minimum(np.abs(p[1] - 0.5), width / 2)
+        back = width / 2 - np.sqrt(np.maximum((width / 2) ** 2 - off**2, 0.0))
+        back *= np.exp(-(np.abs(p[1] - 0.5) - off) / (width / 2))  # which fades above and below the notch
+        p[0] -= back * np.where(p[0] < end, p[0] / end, (1 - p[0]) / (1 - end))
     used = np.unique(t)
     number = np.zeros(p.shape[1], int)
     number[used] = np.arange(used.size)
-    mesh = skfem.MeshQuad(np.ascontiguousarray(p[:, used]), np.ascontiguousarray(number[t]))
-    inner = np.setdiff1d(np.arange(used.size), mesh.boundary_nodes())
-    moved = mesh.p.copy()
-    moved[:, inner] += np.random.default_rng(seed).uniform(-distortion, distortion, (2, inner.size)) / n
-    X = moved[1]
-    sets = {"top": np.flatnonzero(np.isclose(X, 1.0)), "bottom": np.flatnonzero(np.isclose(X, 0.0))}
+    p, t = np.ascontiguousarray(p[:, used]), np.ascontiguousarray(number[t])
+    inner = np.setdiff1d(np.arange(used.size), skfem.MeshQuad(p, t).boundary_nodes())
+    p[:, inner] += np.random.default_rng(seed).uniform(-distortion, distortion, (2, inner.size)) / n
+    sets = {"top": np.flatnonzero(np.isclose(p[1], 1.0)), "bottom": np.flatnonzero(np.isclose(p[1], 0.0))}
     if notch > 0:
         sets["notch"] = np.flatnonzero(tip[used])
-    return Sample(f"block{n}", Space(skfem.MeshQuad(moved, mesh.t)), sets)
+    return Sample(f"block{n}", Space(skfem.MeshQuad(p, t)), sets)
 
 
 def trapezium(n: int) -> Space:
