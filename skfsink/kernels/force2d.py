@@ -16,9 +16,8 @@ stored d xi/d X. Each function below is one pass over the lanes of a tile and ve
 from __future__ import annotations
 
 import numpy as np
-from numba import boolean, float64, njit, types
+from numba import njit
 
-from ..material import LAW
 from .lanes import FAST, GAUSS_HIGH, GAUSS_LOW, J_FLOOR, LANES, guess_inverse_cbrt, refine_inverse_cbrt
 
 # Rows of the workspace and of the geometry, four Gauss points each: a quantity at Gauss point q of lane i is at
@@ -170,13 +169,7 @@ def least_live(J, gamma, least):  # type: ignore[no-untyped-def]
     return least
 
 
-_c = types.Array
-_SIGNATURE = float64(LAW, _c(float64, 1, "C"), float64, _c(types.uint32, 3, "C"), _c(float64, 2, "C"),
-                     _c(float64, 3, "C"), _c(float64, 3, "C"), boolean, _c(float64, 3, "C"), _c(float64, 3, "C"),
-                     _c(float64, 2, "C"))
-
-
-@njit(_SIGNATURE, cache=True, fastmath=FAST, nogil=True)
+@njit(cache=True, fastmath=FAST, nogil=True)
 def force_2d(law, constants, k_bulk, conn, x, geometry, gamma, j_bar, force, W, psi):  # type: ignore[no-untyped-def]
     Q = 4 * LANES
     ws, z = np.empty(_ROWS * LANES), np.empty(8 * LANES)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from .force2d import _SIGNATURE, _add, _dilatation_plain, least_live
+from .force2d import _add, _dilatation_plain, least_live
 from .lanes import FAST, GAUSS_HIGH, GAUSS_LOW, J_FLOOR, guess_inverse_cbrt, refine_inverse_cbrt
 from .lanes import LANES_3D as LANES
 
@@ -186,7 +186,7 @@ def _energy(w, gamma, W, psi):  # type: ignore[no-untyped-def]
             psi[i] += w[q * LANES + i] * gamma[q * LANES + i] * W[q * LANES + i]
 
 
-@njit(_SIGNATURE, cache=True, fastmath=FAST, nogil=True)
+@njit(cache=True, fastmath=FAST, nogil=True)
 def force_3d(law, constants, k_bulk, conn, x, geometry, gamma, j_bar, force, W, psi):  # type: ignore[no-untyped-def]
     L, Q = LANES, 8 * LANES
     z, g, t = np.empty(24 * L), np.empty(3 * Q), np.empty(3 * Q)

@@ -16,12 +16,12 @@ condensed out. gamma multiplies all of it and drops out of P_33 = 0.
 from __future__ import annotations
 
 import numpy as np
-from numba import boolean, float64, njit, types
+from numba import njit
 
-from ..material import LAW, Material
+from ..material import Material
 from ..pattern import Pattern
 from ..space import Space
-from .force2d import _SIGNATURE, _energy, _gather, _kinematics, _nodal_force, _stress, least_live
+from .force2d import _energy, _gather, _kinematics, _nodal_force, _stress, least_live
 from .lanes import FAST, J_FLOOR, LANES
 from .tangent import ERSATZ_STIFFNESS, SOFT_GAMMA
 
@@ -104,7 +104,7 @@ def _density(psi, y, k_bulk, W):  # type: ignore[no-untyped-def]
         W[i] = psi[i] + 0.5 * k_bulk * dilatation * dilatation
 
 
-@njit(_SIGNATURE, cache=True, fastmath=FAST, nogil=True)
+@njit(cache=True, fastmath=FAST, nogil=True)
 def force_plane_stress(law, constants, k_bulk, conn, x, geometry, gamma, j_bar, force, W, psi):  # type: ignore[no-untyped-def]
     """Arguments and results as of :func:`.force2d.force_2d`; `j_bar` has no meaning here."""
     ws, z, t_stress, ab = np.empty(11 * _Q), np.empty(8 * LANES), np.empty(4 * _Q), np.empty(2 * _Q)
@@ -168,13 +168,7 @@ def _second(inv_j, y, p, s, dpsi, ddpsi, k_bulk, convex, c):  # type: ignore[no-
                    - Wjx * Wjx / Wxx)
 
 
-_c = types.Array
-_TANGENT = types.void(LAW, _c(float64, 1, "C"), float64, float64, _c(types.int64, 2, "C", readonly=True),
-                      _c(float64, 2, "C"), _c(float64, 4, "C", readonly=True), _c(float64, 2, "C", readonly=True),
-                      _c(float64, 2, "C"), boolean, _c(types.int32, 3, "C"), _c(float64, 1, "C"))
-
-
-@njit(_TANGENT, cache=True, fastmath=FAST, nogil=True)
+@njit(cache=True, fastmath=FAST, nogil=True)
 def _tangent(law, constants, k_bulk, mu, conn, x, dN, w, gamma, convex, slot, data):  # type: ignore[no-untyped-def]
     """With n_a = F Grad N_a and c_a = cof F Grad N_a (so dt = 2 n.du and dj = c.du) one Gauss point gives
 
@@ -231,10 +225,6 @@ def _tangent(law, constants, k_bulk, mu, conn, x, dN, w, gamma, convex, slot, da
                     data[at] += K[i, k] if i <= k else K[k, i]
 
 
-_STIFFNESS = float64(LAW, _c(float64, 1, "C"), float64, _c(types.uint32, 3, "C"), _c(float64, 2, "C"),
-                     _c(float64, 3, "C"), _c(float64, 3, "C"), _c(float64, 2, "C"))
-
-
 @njit(fastmath=FAST)
 def _try(conn, inverse_mass, b, z, norm):  # type: ignore[no-untyped-def]
     """The vector M^-1 b of each element (rows of z as of positions), and the square of its norm in the mass."""
@@ -262,7 +252,7 @@ def _quadratic(ws, d, W, w, gamma, form):  # type: ignore[no-untyped-def]
                                      + W[2, i] * dt * dt + 2.0 * W[3, i] * dt * dj + W[4, i] * dj * dj)
 
 
-@njit(_STIFFNESS, cache=True, fastmath=FAST, nogil=True)
+@njit(cache=True, fastmath=FAST, nogil=True)
 def stiffness_plane_stress(law, constants, k_bulk, conn, x, geometry, gamma, inverse_mass):  # type: ignore[no-untyped-def]
     """Greatest Rayleigh quotient of the tangent and the mass for M^-1 b of an element [1/s^2], b = dJ_mean/du.
 

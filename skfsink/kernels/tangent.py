@@ -20,9 +20,9 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numba import boolean, float64, njit, types
+from numba import njit
 
-from ..material import LAW, Material
+from ..material import Material
 from ..space import Pattern, Space
 from .lanes import J_FLOOR
 
@@ -69,12 +69,8 @@ def _make(dim: int) -> Callable[..., Any]:
     """The element loop for one dimension, with its sizes as constants so that the compiler unrolls it."""
     na = 2**dim
     nd = na * dim
-    _c = types.Array
-    signature = types.void(LAW, _c(float64, 1, "C"), float64, float64, _c(types.int64, 2, "C", readonly=True),
-                           _c(float64, 2, "C"), _c(float64, 4, "C", readonly=True), _c(float64, 2, "C", readonly=True),
-                           _c(float64, 2, "C"), boolean, boolean, _c(types.int32, 3, "C"), _c(float64, 1, "C"))
 
-    @njit(signature, cache=True, fastmath={"contract", "arcp", "nsz", "reassoc"}, nogil=True)
+    @njit(cache=True, fastmath={"contract", "arcp", "nsz", "reassoc"}, nogil=True)
     def loop(law, constants, k_bulk, mu, conn, x, dN, w, gamma, j_bar, convex, slot, data):  # type: ignore[no-untyped-def]
         K, b = np.empty((nd, nd)), np.empty(nd)
         g, nf, A, z = np.empty((na, nd)), np.empty((na, nd)), np.empty(nd), np.empty(nd)

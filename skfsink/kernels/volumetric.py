@@ -8,17 +8,12 @@ the passes of the force loops are used again.
 from __future__ import annotations
 
 import numpy as np
-from numba import float64, njit, types
+from numba import njit
 
 from . import force2d, force3d
 from .lanes import FAST, LANES, LANES_3D
 
 __all__ = ["volumetric_2d", "volumetric_3d"]
-
-_c = types.Array
-_SIGNATURE = float64(_c(types.uint32, 3, "C"), _c(float64, 2, "C"), _c(float64, 3, "C"), _c(float64, 3, "C"),
-                     _c(float64, 2, "C"))
-
 
 @njit(fastmath=FAST)
 def _greatest(conn, b, inverse_mass, w, gamma, sums, greatest):  # type: ignore[no-untyped-def]
@@ -41,7 +36,7 @@ def _greatest(conn, b, inverse_mass, w, gamma, sums, greatest):  # type: ignore[
     return greatest
 
 
-@njit(_SIGNATURE, cache=True, fastmath=FAST, nogil=True)
+@njit(cache=True, fastmath=FAST, nogil=True)
 def volumetric_2d(conn, x, geometry, gamma, inverse_mass):  # type: ignore[no-untyped-def]
     Q = 4 * LANES
     z, ws, t = np.empty(8 * LANES), np.empty(11 * Q), np.empty(4 * Q)
@@ -58,7 +53,7 @@ def volumetric_2d(conn, x, geometry, gamma, inverse_mass):  # type: ignore[no-un
     return greatest
 
 
-@njit(_SIGNATURE, cache=True, fastmath=FAST, nogil=True)
+@njit(cache=True, fastmath=FAST, nogil=True)
 def volumetric_3d(conn, x, geometry, gamma, inverse_mass):  # type: ignore[no-untyped-def]
     L, Q = LANES_3D, 8 * LANES_3D
     z, F, P, t = np.empty(24 * L), np.empty(9 * Q), np.empty(9 * Q), np.empty(4 * Q)
