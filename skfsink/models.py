@@ -126,7 +126,7 @@ class Ladder:
         except FileNotFoundError:
             raise OutputError(f"the models of {case} were not measured: there is no {path}; python -m "
                               f"skfsink.study.ladder {case} makes it") from None
-        except (OSError, ValueError, KeyError, TypeError) as error:
+        except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
             raise OutputError(f"{path} is no measured ladder: {error}") from None
 
     def error(self, name: str, quantity: str) -> float | None:

@@ -1,0 +1,131 @@
+"""The ladder of models of each scene, measured: `python -m skfsink.study.ladder` writes `cases/<case>/ladder.json`.
+
+Every rung of :data:`.models.LADDERS` is run once, on one core; it goes on where it was stopped. A further run on
+another mesh of the same sizes tells how much of an error may be that of the mesh.
+"""
+
+# ruff: noqa: E402
+
+from __future__ import annotations
+
+import os
+
+for _name in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")
+
+import importlib
+import inspect
+import tempfile
+import time
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any
+
+from cyclopts import Parameter
+
+from ..corridor import corridor_report, lay_corridor
+from ..errors import ParameterError
+from ..models import LADDERS, SCATTER, rung
+from ..options import Options
+from ..progress import Display
+from ..quantities import crack_cells, measured
+from ..sample import data_folder
+from ..scene import Scene
+from ..simulate import Simulation
+from .ladder_chart import draw_ladders
+from .store import Store
+
+__all__ = ["MESHES", "ladder", "measure"]
+
+#: mesh of each case on which its models are compared
+MESHES = {"single_edge_notch": "M3", "simple_shear": "coarse", "symmetric_double_edge_notch": "coarse",
+          "asymmetric_double_edge_notch": "M3", "dog_bone": "coarse", "cylindrical_shell": "coarse"}
+FLAG = Parameter(negative="", show_default=False)
+
+
+def ladder(*cases: str, fresh: Annotated[bool, FLAG] = False, draw: Annotated[bool, FLAG] = False,
+           out: Path | None = None, quiet: Annotated[bool, FLAG] = False) -> None:
+    """Measure the price and the error of each model of the cases, and draw one against the other.
+
+    Parameters
+    ----------
+    cases
+        Names of the cases; all six without any.
+    fresh
+        Measure all models anew; without it, those that are stored are kept.
+    draw
+        Only draw what is stored.
+    out
+        Folder for the picture; default docs/images of the checkout.
+    quiet
+        Show no progress.
+    """
+    for case in cases:
+        if case not in LADDERS:
+            raise ParameterError(f"case must be one of {', '.join(LADDERS)}; got {case!r}")
+    with Display(quiet) as display:
+        for case in () if draw else cases or tuple(LADDERS):
+            store = Store(data_folder(case) / "ladder.json", f"ladder of {case}", fresh)
+            display.phase(case)
+            names = (*LADDERS[case], SCATTER)
+            _warm(case) if set(names) - store.points.keys() else None
+            for i, name in enumerate(names):
+                display.update(i / len(names), name)
+                store.point(name, partial(measure, case, name))
+    folder = out or Path(__file__).resolve().parents[2] / "docs" / "images"
+    folder.mkdir(parents=True, exist_ok=True)
+    draw_ladders(folder / "ladder.png")
+
+
+def scene_of(case: str, options: Options, mesh: str, **dimensions: Any) -> tuple[Scene, dict[str, Any]]:
+    """The scene of a case and the arguments of its function."""
+    module = importlib.import_module(f"skfsink.cases.{case}")
+    own = {name: parameter.default for name, parameter in inspect.signature(getattr(module, case)).parameters.items()
+           if name != "options"} | {"mesh": mesh} | dimensions
+    scene: Scene = module._scene(own, options)
+    return scene, own
+
+
+def measure(case: str, name: str, mesh: str = "", base: Options = Options()) -> dict[str, Any]:  # noqa: B008
+    """Run a rung without drawing: its figures for the whole sample, its crack, and its price in processor time [s].
+
+    `mesh` is that of :data:`MESHES` by default; `base` holds the other options.
+    """
+    mesh = mesh or MESHES[case]
+    seed = {"mesh_seed": 1} if name == SCATTER else {}
+    options = rung(case, "dynamics" if seed else name).apply(base)
+    with tempfile.TemporaryDirectory() as temporary, Display(quiet=True) as display:
+        folder, start, cpu = Path(temporary), time.perf_counter(), time.process_time()
+        scene, own = scene_of(case, options, mesh, **seed)
+        if options.mesh_layout == "two-pass":
+            options = lay_corridor(scene, own, options, folder, display)
+            scene, _ = scene_of(case, options, mesh)
+        made = time.perf_counter() - start
+        simulation = Simulation(scene, folder, display)
+        state = simulation.run()
+        price = time.process_time() - cpu
+        event = {"corridor": corridor_report(simulation, folder)} if options.mesh_layout == "two-pass" else {}
+    recorder, cost = simulation.recorder, simulation.cost()
+    wall = {"mesh": made, "loading": cost["wall"]["loading"], "event": cost["wall"]["event"]}
+    space, steps = scene.sample.space, cost["steps"]
+    return {"mesh": mesh, "made": bool(scene.sample.made), "elements": space.n_elements,
+            "quantities": measured(scene, recorder), "crack": crack_cells(scene, state, recorder.tracker.arrival),
+            "price_s": price, "wall": wall, "steps": steps, "factorisations": cost["factorisations"],
+            "mean_step_s": state.time / steps if options.analysis == "dynamic" and steps else None,
+            "branches": recorder.tracker.max_branches, "warnings": simulation.notes.texts, **event}
+
+
+def _warm(case: str) -> None:
+    """Have the loops of the case compiled, or read from the cache, before they are timed."""
+    others: dict[str, list[dict[str, Any]]] = {"dog_bone": [{"element": "planestress"}], "cylindrical_shell": []}
+    solid = case in others
+    for values in ({}, *others.get(case, [{"dimensions": 3}])):
+        with tempfile.TemporaryDirectory() as folder, Display(quiet=True) as display:
+            scene, _ = scene_of(case if solid else "single_edge_notch", Options(event_time=1e-6, **values), "coarse")
+            Simulation(scene, Path(folder), display).run()
+
+
+if __name__ == "__main__":
+    from ..cli import command
+
+    command(ladder, package="study")
