@@ -21,6 +21,7 @@ from ..hht import HHTControls
 from .body import Body, Integrator, warm
 from .chart import draw_front, page
 from .meshes import load_plate
+from .pareto import pareto_front
 from .part import Part, Planned, Points
 
 __all__ = ["ERRORS", "TIME", "Method", "errors"]
@@ -174,12 +175,18 @@ def panel(ax: Axes, rows: list[dict[str, Any]], measure: str) -> None:
 
 
 def table(points: Points) -> list[str]:
-    """The methods by cost, and the halving of the reference."""
+    """The methods on one of the fronts, the defaults, those that failed, and the halving of the reference, by cost."""
+    rows = sorted(summary(points), key=lambda row: row["cost"])
+    good = [row for row in rows if "failed" not in row and row["family"] != "reference"]
+    best = {name: [good[i]["name"] for i in pareto_front([row["cost"] for row in good], [row[name] for row in good])]
+            for name in ERRORS}
     lines = ["| method | processor time (s) | arrival | D | tip history |", "|---|---|---|---|---|"]
-    for row in sorted(summary(points), key=lambda row: row["cost"]):
-        values = (f"failed: {row['failed']} | | |" if "failed" in row else
-                  " | ".join(f"{100 * row[name]:.2f} %" for name in ERRORS) + " |")
-        lines.append(f"| {row['name']} | {row['cost']:.2f} | {values}")
+    for row in rows:
+        name = row["name"]
+        cells = [f"failed: {row['failed']}", "", ""] if "failed" in row else [
+            f"**{100 * row[e]:.2f} %**" if name in best[e] else f"{100 * row[e]:.2f} %" for e in ERRORS]
+        if "failed" in row or row["line"] in ("", "default") or any(name in names for names in best.values()):
+            lines.append(f"| {name} | {row['cost']:.2f} | " + " | ".join(cells) + " |")
     return lines
 
 

@@ -129,7 +129,7 @@ def draw(points: Points, path: Path) -> None:
                     ax.plot(h, error, style, ms=3.5, color=colour, label=name + rate)
             ax.set(xscale="log", yscale="log", xlabel="element size $h$ (mm)",
                    ylabel=f"relative error of the\n{QUANTITIES[quantity][2]}")
-            ax.legend(fontsize=5.5)
+            ax.legend(fontsize=5)
             panel(axes[column + 3], points, quantity)
 
 

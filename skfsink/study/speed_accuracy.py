@@ -8,6 +8,7 @@ stopped; `--quick` takes fewer points and less than three minutes.
 
 from __future__ import annotations
 
+import logging
 import os
 
 for _name in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
@@ -54,6 +55,7 @@ def speed_accuracy(*, only: Literal["time", "space", "model", "solvers"] | None 
     quiet
         Show no progress.
     """
+    logging.getLogger("skfsink").setLevel(logging.ERROR)  # methods are taken to their limits, where runs would warn
     store = Store(out / "speed_accuracy.json", "speed_accuracy", fresh)
     with Display(quiet) as display:
         run_parts(store, [PARTS[only]] if only else list(PARTS.values()), quick, display)
@@ -85,8 +87,9 @@ def run_parts(store: Store, parts: list[Part], quick: bool, display: Display) ->
                 if new and "failed" in points[p.key]:
                     display.say(f"{p.key} failed: {points[p.key]['failed']}")
         except KeyboardInterrupt:
-            raise Interrupted(f"interrupted; {len(store.points)} points are in {store.path}, and the same command goes "
-                              f"on from there") from None
+            kept = (f"{len(store.points)} points are in {store.path}, and the same command goes on from there"
+                    if store.points else "nothing was computed yet")
+            raise Interrupted(f"interrupted; {kept}") from None
         found[part.name] = points
         part.draw(points, folder / f"{store.study}_{part.name}.png")
         display.update(1.0, "")
