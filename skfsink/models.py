@@ -101,7 +101,7 @@ def ladder_path(case: str) -> Path:
 
 
 class Ladder:
-    """The measured ladder of a case.
+    """The measured ladder of a case, in the file that is committed or another one.
 
     Attributes
     ----------
@@ -114,8 +114,8 @@ class Ladder:
         There is none, or it cannot be read.
     """
 
-    def __init__(self, case: str) -> None:
-        self.case, path = case, ladder_path(case)
+    def __init__(self, case: str, path: Path | None = None) -> None:
+        self.case, path = case, path or ladder_path(case)
         try:
             data = json.loads(path.read_text(encoding="utf-8"))
             points: dict[str, dict[str, Any]] = data["points"]

@@ -25,11 +25,10 @@ from cyclopts import Parameter
 
 from ..corridor import corridor_report, lay_corridor
 from ..errors import ParameterError
-from ..models import LADDERS, SCATTER, rung
+from ..models import LADDERS, SCATTER, Ladder, ladder_path, rung
 from ..options import Options
 from ..progress import Display
 from ..quantities import crack_cells, measured
-from ..sample import data_folder
 from ..scene import Scene
 from ..simulate import Simulation
 from .ladder_chart import draw_ladders
@@ -56,7 +55,7 @@ def ladder(*cases: str, fresh: Annotated[bool, FLAG] = False, draw: Annotated[bo
     draw
         Only draw what is stored.
     out
-        Folder for the picture; default docs/images of the checkout.
+        Folder for CASE/ladder.json and the picture; by default they go where the program and its docs read them.
     quiet
         Show no progress.
     """
@@ -65,16 +64,20 @@ def ladder(*cases: str, fresh: Annotated[bool, FLAG] = False, draw: Annotated[bo
             raise ParameterError(f"case must be one of {', '.join(LADDERS)}; got {case!r}")
     with Display(quiet) as display:
         for case in () if draw else cases or tuple(LADDERS):
-            store = Store(data_folder(case) / "ladder.json", f"ladder of {case}", fresh)
+            store = Store(_file(case, out), f"ladder of {case}", fresh)
             display.phase(case)
             names = (*LADDERS[case], SCATTER)
             _warm(case) if set(names) - store.points.keys() else None
             for i, name in enumerate(names):
                 display.update(i / len(names), name)
                 store.point(name, partial(measure, case, name))
-    folder = out or Path(__file__).resolve().parents[2] / "docs" / "images"
-    folder.mkdir(parents=True, exist_ok=True)
-    draw_ladders(folder / "ladder.png")
+    picture = (out or Path(__file__).resolve().parents[2] / "docs" / "images") / "ladder.png"
+    picture.parent.mkdir(parents=True, exist_ok=True)
+    draw_ladders({case: Ladder(case, path) for case in LADDERS if (path := _file(case, out)).exists()}, picture)
+
+
+def _file(case: str, out: Path | None) -> Path:
+    return ladder_path(case) if out is None else out / case / "ladder.json"
 
 
 def scene_of(case: str, options: Options, mesh: str, **dimensions: Any) -> tuple[Scene, dict[str, Any]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from ..errors import OutputError
-from ..models import LADDERS, REFERENCE, Ladder
+from ..models import LADDERS, REFERENCE, Ladder, ladder_path
 from ..options import QUANTITIES
 from .chart import page
 
@@ -25,20 +25,8 @@ LEAST, MOST = 1e-4, 2.0  # errors that are drawn; smaller and larger ones are pu
 TOLERANCE = 0.05
 
 
-def measured_ladders() -> dict[str, Ladder]:
-    """The ladders that are measured, by case."""
-    found = {}
-    for case in LADDERS:
-        try:
-            found[case] = Ladder(case)
-        except OutputError:
-            continue
-    return found
-
-
-def draw_ladders(path: Path, quantity: str = "U") -> None:
+def draw_ladders(ladders: Mapping[str, Ladder], path: Path, quantity: str = "U") -> None:
     """Draw the error of `quantity` against the price, a panel a scene."""
-    ladders = measured_ladders()
     title = f"Models of the six scenes: error of ${quantity}$ at the first arrival against price"
     with page(path, title, 3, 2, 8.6) as axes:
         for ax, case in zip(axes, LADDERS):
@@ -90,9 +78,8 @@ def _label(ax: Axes, shown: list[tuple[tuple[float, float], str, str]]) -> None:
                     arrowprops=line if abs(up) > 7 else None)
 
 
-def errors_table(case: str) -> str:
+def errors_table(ladder: Ladder) -> str:
     """Price and errors of the rungs of a case, the cheapest first, as a table in Markdown."""
-    ladder = Ladder(case)
     lines = ["| model | elements | price (s) | " + " | ".join(QUANTITIES) + " |", "|---" * (3 + len(QUANTITIES)) + "|"]
     for name in ladder.by_price():
         point = ladder.points[name]
@@ -113,10 +100,10 @@ def _value(point: dict[str, dict[str, float]], quantity: str) -> str:
     return "" if value is None else f"{value:.4g}"
 
 
-def choices_table(tolerance: float = TOLERANCE) -> str:
+def choices_table(ladders: Mapping[str, Ladder], tolerance: float = TOLERANCE) -> str:
     """What `--model auto` takes for each quantity, as a table in Markdown."""
     lines = ["| scene | " + " | ".join(QUANTITIES) + " |", "|---" * (1 + len(QUANTITIES)) + "|"]
-    for case, ladder in measured_ladders().items():
+    for case, ladder in ladders.items():
         cells = []
         for quantity in QUANTITIES:
             name = ladder.cheapest(quantity, tolerance, gmsh=True)[0]
@@ -126,6 +113,7 @@ def choices_table(tolerance: float = TOLERANCE) -> str:
 
 
 if __name__ == "__main__":
-    for name in measured_ladders():
-        sys.stdout.write(f"### {name}\n\n{errors_table(name)}\n")
-    sys.stdout.write(choices_table())
+    measured = {case: Ladder(case) for case in LADDERS if ladder_path(case).is_file()}
+    for case, ladder in measured.items():
+        sys.stdout.write(f"### {case}\n\n{errors_table(ladder)}\n")
+    sys.stdout.write(choices_table(measured))
