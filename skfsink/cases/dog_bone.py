@@ -51,7 +51,7 @@ def dog_bone(*, length: Annotated[float, SAMPLE] = 10.0, gauge_length: Annotated
     fillet
         Radius of the quarter circles between the gauge and the ends, tangent to the gauge [mm], > 0.
     thickness
-        Thickness along z [mm], > 0; without effect in plane stress.
+        Thickness along z [mm], > 0; in plane stress it only scales the `quantities` of the summary.
     layers
         Elements over the thickness, >= 1; none in plane stress.
     mesh
