@@ -49,7 +49,7 @@ class Recorder:
         self.at_arrival: dict[str, float] = dict(memory["at_arrival"])
         self.separated_at = float(memory.get("separated_at", np.inf))   #: first record after the separation [s]
         self.series.resume(len(self.frames))  # this may refuse, before any file is touched
-        self.history = History(folder / "history.csv", memory["rows"])
+        self.history = History(folder / "history.csv", memory["rows"], space.dim)
         self._load_nodes = held[0]
         first = np.array([v or 0.0 for v in scene.grips[0].velocity])
         self._load_direction = first / (np.linalg.norm(first) or 1.0)

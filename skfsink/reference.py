@@ -20,7 +20,8 @@ import numpy as np
 
 from .deformed import Frame
 from .errors import OutputError
-from .output import HISTORY_COLUMNS, History, write_atomic, write_summary
+from .history import HISTORY_COLUMNS, Table, history_header
+from .output import History, write_atomic, write_summary
 from .packing import Packer, pack_file, unpack_file
 from .pictures import read_frame
 from .run import SCENE, SUMMARY, read_scene
@@ -188,10 +189,10 @@ def _times(path: Path) -> list[float]:
         raise OutputError(f"{path} is missing or damaged") from None
 
 
-def _table(history: dict[str, np.ndarray]) -> str:
+def _table(history: Table) -> str:
     cells = [[f"{value:.{DIGITS}g}" if values.dtype.kind == "f" else str(value) for value in values]
              for values in (history[name] for name in HISTORY_COLUMNS)]
-    return "".join(",".join(row) + "\n" for row in [tuple(HISTORY_COLUMNS), *zip(*cells)])
+    return "".join(",".join(row) + "\n" for row in [history_header(history.dim), *zip(*cells)])
 
 
 # --- reading ---

@@ -58,7 +58,8 @@ def write_run(folder: Path, scene: Scene) -> Path:
     """A finished run in a folder; returns the folder."""
     quasistatic = scene.controls.analysis == "quasistatic"
     (folder / "series").mkdir(parents=True)
-    series, history = Series(folder / "series", "run", scene.sample.space), History(folder / "history.csv")
+    space = scene.sample.space
+    series, history = Series(folder / "series", "run", space), History(folder / "history.csv", dim=space.dim)
     history.append({"phase": "loading", "elastic": 0.05, "step": 1})
     for i, tip in enumerate(TIPS):
         frame = cracked(scene, tip)

@@ -6,6 +6,7 @@ import json
 import math
 import os
 import signal
+import tempfile
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
@@ -14,9 +15,18 @@ import numpy as np
 import pytest
 from bodies import grid
 
-from skfsink import output
 from skfsink.errors import OutputError
-from skfsink.output import HISTORY_COLUMNS, History, Series, prepare_folder, replaced, write_atomic, write_summary
+from skfsink.history import history_header
+from skfsink.output import (
+    HISTORY_COLUMNS,
+    History,
+    Series,
+    prepare_folder,
+    replaced,
+    versions,
+    write_atomic,
+    write_summary,
+)
 from skfsink.space import Space
 
 AWKWARD = [0.1 + 0.2, 1 / 3, -0.0, 5e-324, 1.7976931348623157e308, math.nan, -math.inf, np.float64(np.pi)]
@@ -80,8 +90,28 @@ def test_columns_left_out_and_columns_unknown(tmp_path: Path) -> None:
         history.append({"tip_w_mm": 1.0})
 
 
+@pytest.mark.parametrize("dim, force, energy", [(2, "N_per_mm", "N_mm_per_mm"), (3, "N", "N_mm")])
+def test_each_column_says_its_unit_and_old_files_are_read(tmp_path: Path, dim: int, force: str, energy: str) -> None:
+    """Fails if a quantity with a unit has none in the header, or a file of version 0.1 is not read as before."""
+    made = [{**row, "tip_z_mm": 0.1 if dim == 3 else math.nan} for row in rows()]
+    history = History(tmp_path / "history.csv", made, dim)
+    header = history.path.read_text().splitlines()[0].split(",")
+    plain = {"phase", "step", "tips", "branches", "deleted_elements", "gamma_min"}
+    assert [name for name in header if not name.endswith(("_s", "_mm", force, energy)) and name not in plain] == []
+    loaded = History.load(history.path)
+    assert loaded.dim == dim and loaded[f"reaction_{force}"] is loaded["reaction_N_per_mm"]
+    assert {name.replace(" ", "_").replace("/", "_per_") for name in loaded.units.values()} == {
+        "", "1", "s", "mm", "m_per_s", force, energy}
+    with pytest.raises(KeyError):
+        loaded["nothing"]
+    old = history.path.read_text().replace(",".join(header), ",".join(HISTORY_COLUMNS), 1)
+    history.path.write_text(old)
+    assert same_bits(History.load(history.path), loaded) and History.load(history.path).units == loaded.units
+
+
 @pytest.mark.parametrize("text", ["", "a,b\n1,2\n", ",".join(HISTORY_COLUMNS) + "\nevent,1\n",
-                                  ",".join(HISTORY_COLUMNS) + "\n" + ",".join(["x"] * len(HISTORY_COLUMNS)) + "\n"])
+                                  ",".join(HISTORY_COLUMNS) + "\n" + ",".join(["x"] * len(HISTORY_COLUMNS)) + "\n",
+                                  ",".join(history_header(3)) + "\nevent,1\n"])
 def test_other_files_are_no_history(tmp_path: Path, text: str) -> None:
     path = tmp_path / "history.csv"
     path.write_text(text)
@@ -194,7 +224,7 @@ def test_killed_midway_the_series_names_no_missing_file_and_goes_on(tmp_path: Pa
             if last:
                 os.kill(os.getpid(), signal.SIGKILL)
 
-        output.os.replace = deadly
+        os.replace = deadly
         series = Series(tmp_path, "run", space)
         for i in range(4):
             series.add(0.1 * i, *fields(space, i))
@@ -263,7 +293,7 @@ def test_a_folder_that_cannot_be_used_is_refused(tmp_path: Path, monkeypatch: py
     def refuse(**_: object) -> None:
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(output.tempfile, "TemporaryFile", refuse)
+    monkeypatch.setattr(tempfile, "TemporaryFile", refuse)
     with pytest.raises(OutputError) as error:
         prepare_folder(tmp_path / "new")
     assert str(error.value) == f"cannot write to the output folder {tmp_path / 'new'}: Permission denied"
@@ -294,7 +324,7 @@ def test_numbers_that_are_not_finite_are_refused_by_name(tmp_path: Path, bad: di
 
 
 def test_versions() -> None:
-    found = output.versions()
+    found = versions()
     assert list(found)[:2] == ["skfsink", "python"] and list(found)[-1] == "machine"
     assert {"numpy", "scipy", "scikit-fem", "numba", "pyamg", "meshio"} <= set(found)
     assert found["numpy"] == np.__version__
