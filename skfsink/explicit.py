@@ -116,6 +116,7 @@ class Explicit:
         self._free = np.ascontiguousarray(free.reshape(-1, self.space.dim))
         self._grip_velocity = grip_velocity
         self._pattern = Pattern(self.space, self.space.dim, free, upper=True)
+        self._mass_floor = max(self.controls.mass_floor, 1e-12)  # a node without mass or force stays where it is
         self.dt = 0.0
         self.estimates = 0
         self._omega = 0.0
@@ -128,7 +129,7 @@ class Explicit:
     def start(self, state: State) -> None:
         """Forces, masses and accelerations of `state`; to be called once before stepping, and after a resume."""
         self.momentum.set_gamma(state.gamma, state.deleted)
-        self.mass = self.momentum.lumped_mass(self.controls.mass_floor)
+        self.mass = self.momentum.lumped_mass(self._mass_floor)
         self.reaction = self.momentum.force(state.u)
         self._W = self.momentum.tiles.W
         self._W_max = self.momentum.tiles.tile(state.W_max)
@@ -196,7 +197,7 @@ class Explicit:
         failed = delete_failed(self.space, state, self.deletion, self.density.law.failure_energy)
         left = left_in(momentum, state.gamma, failed) if failed.size else 0.0
         stored = momentum.set_gamma(state.gamma, state.deleted)
-        mass, self.mass = self.mass, momentum.lumped_mass(self.controls.mass_floor)
+        mass, self.mass = self.mass, momentum.lumped_mass(self._mass_floor)
         ledger.sink_stored += stored - left
         ledger.deletion += left
         ledger.sink_kinetic += 0.5 * float((mass - self.mass) @ np.einsum("ai,ai->a", state.v, state.v))

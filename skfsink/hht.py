@@ -175,6 +175,8 @@ class HHT:
             inertia = self.inertia.times(mass, a.ravel()[free])
             r = inertia + ((1 + c.alpha) * force - c.alpha * self.reaction).ravel()[free]
             live = np.repeat(self.space.lump(momentum.gamma) > 1e-3 * self._volume, shape[1])[free]
+            if not live.any():
+                return None, iteration  # a trial that kills the whole body
             level = momentum.tiles.mean_force() + float(np.mean(np.abs(inertia[live]))) + self._rounding[0]
             increment = float(np.abs((u - state.u).ravel()[free][live]).max()) + self._rounding[1]
             balanced = np.abs(r[live]).max() <= c.force_tolerance * level
