@@ -14,6 +14,7 @@ from .momentum import Momentum
 from .output import History, Series, prepare_folder, write_atomic
 from .scene import Scene
 from .state import State
+from .stress import cauchy_stress, pressure, von_mises
 
 __all__ = ["Recorder"]
 
@@ -118,11 +119,13 @@ class Recorder:
         if label:
             self.moments[label] = len(self.frames)
         self.frames.append((state.time, label))
+        stress = cauchy_stress(momentum, state.u)
         self.series.add(
             state.time,
             {"displacement": state.u, "velocity": state.v, "gamma": state.gamma},
             {"deleted": state.deleted.astype(np.int8), "W": space.element_mean(np.minimum(momentum.W, 1e3)),
-             "gamma_element": space.element_mean(momentum.gamma)})
+             "gamma_element": space.element_mean(momentum.gamma), "stress": stress, "pressure": pressure(stress),
+             "von_mises": von_mises(stress)})
 
     def _record(self, state: State, reaction: np.ndarray, dt: float) -> None:
         self.tips = self.tracker.look(state.time, state.gamma)

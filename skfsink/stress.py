@@ -1,0 +1,62 @@
+"""The Cauchy stress of a body, as it is written for ParaView."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .kernels.lanes import J_FLOOR
+from .momentum import Momentum
+
+__all__ = ["cauchy_stress", "pressure", "von_mises"]
+
+_CHUNK = 8192                                   # elements at a time
+_VOIGT = ([0, 1, 2, 0, 1, 0], [0, 1, 2, 1, 2, 2])    # components xx, yy, zz, xy, yz, xz, in the order of VTK
+
+
+def cauchy_stress(momentum: Momentum, u: np.ndarray) -> np.ndarray:
+    """Cauchy stress [MPa], element means (ne, 6) of the components xx, yy, zz, xy, yz, xz.
+
+    sigma = P F^T / J with the P = gamma dW/dF (Eq. 11) that the force integrates: the volumetric part of the element
+    "jbar" is gamma_bar k (J_bar - 1), one value an element. `u` is the displacement (n, dim); the relative density is
+    the one `momentum` has, which is 0 at points that exert no force.
+    """
+    space, gamma = momentum.space, momentum.gamma
+    means = np.zeros((space.n_elements, 6))
+    for start in range(0, space.n_elements, _CHUNK):
+        part = slice(start, start + _CHUNK)
+        means[part] = np.einsum("eq,eqc->ec", space.w[part], _at_points(momentum, u, part, gamma[part]))
+    return np.asarray(means / space.V[:, None])
+
+
+def _at_points(momentum: Momentum, u: np.ndarray, part: slice, gamma: np.ndarray) -> np.ndarray:
+    space, material, k = momentum.space, momentum.material, momentum.material.bulk_modulus
+    F = np.zeros((*gamma.shape, 3, 3))
+    F[...] = np.eye(3)
+    F[..., :space.dim, :space.dim] += np.einsum("eai,eqaJ->eqiJ", u[space.conn[part]], space.dN[part])
+    raw = np.linalg.det(F)
+    F[raw < J_FLOOR] = np.eye(3)  # only points without stiffness get there
+    if momentum.plane_stress:
+        F = material.thin_sheet(F[..., :2, :2])
+    J_bar = J = np.linalg.det(F)
+    gamma_bar = gamma
+    if momentum.j_bar:
+        w = space.w[part]
+        J_bar, gamma_bar = ((w * a).sum(axis=1, keepdims=True) / w.sum(axis=1, keepdims=True) for a in (raw, gamma))
+    b = np.einsum("eqiJ,eqjJ->eqij", F, F)
+    trace = np.trace(b, axis1=-2, axis2=-1)
+    _, slope, _ = material.isochoric(J ** (-2 / 3) * trace)
+    shear = gamma * slope * J ** (-5 / 3)
+    mean = gamma_bar * k * (J_bar - 1) - 2 / 3 * shear * trace
+    return np.asarray(2 * shear[..., None] * b[..., _VOIGT[0], _VOIGT[1]]
+                      + mean[..., None] * np.array([1.0, 1, 1, 0, 0, 0]))
+
+
+def pressure(stress: np.ndarray) -> np.ndarray:
+    """-tr(sigma)/3 [MPa] of stresses (..., 6)."""
+    return np.asarray(-stress[..., :3].mean(axis=-1))
+
+
+def von_mises(stress: np.ndarray) -> np.ndarray:
+    """sqrt(3/2 s:s) [MPa] of stresses (..., 6), s their deviator."""
+    normal = stress[..., :3] + pressure(stress)[..., None]
+    return np.asarray(np.sqrt(1.5 * (normal**2).sum(axis=-1) + 3.0 * (stress[..., 3:] ** 2).sum(axis=-1)))
