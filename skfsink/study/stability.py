@@ -17,7 +17,7 @@ import logging
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 from cyclopts import Parameter
 from matplotlib.axes import Axes
@@ -84,7 +84,7 @@ def stability(*, only: Literal["explicit", "hht", "alpha", "staggering", "sink",
     logging.disable(logging.WARNING)  # failures are what is looked for here
     try:
         with Display(quiet) as display:
-            run_parts(store, [Part(name, failure.plan, partial(_picture, name, points), lambda _: [])
+            run_parts(store, [Part(name, failure.plan, partial(_picture, name, points), _table)
                               for name, failure in chosen.items()], quick, display)
     finally:
         logging.disable(logging.NOTSET)
@@ -97,6 +97,19 @@ def _picture(name: str, seen: dict[str, Points], points: Points, path: Path) -> 
     failure, seen[name] = FAILURES[name], points
     with page(path, "", 1, failure.panels, 2.7, width=3.6 * failure.panels) as axes:
         failure.draw(axes, points)
+
+
+def _table(points: Points) -> list[str]:
+    """The figures of the points as a table, a line each; lists of numbers and times are left out."""
+    rows = [{"point": key, **{name: value for name, value in point.items() if name not in ("wall_s", "cpu_s")}}
+            for key, point in points.items()]
+    names = list(dict.fromkeys(name for row in rows for name, value in row.items() if not isinstance(value, list)))
+    lines = [names, ["---"] * len(names)] + [[_text(row.get(name, "")) for name in names] for row in rows]
+    return ["| " + " | ".join(line) + " |" for line in lines]
+
+
+def _text(value: Any) -> str:
+    return f"{value:.5g}" if isinstance(value, float) else "" if isinstance(value, list) else str(value)
 
 
 def _overview(points: dict[str, Points], path: Path) -> None:

@@ -45,7 +45,10 @@ def locking(element: str, ratio: float, n: int = 16) -> dict[str, Any]:
     move = np.zeros_like(space.X)
     move[right, 1] = 1.0
     newton = Newton(momentum, free.ravel(), StaticsControls().tolerance, 40)
-    u, force = newton.equilibrium(newton.predict(np.zeros_like(space.X), move))
+    try:
+        u, force = newton.equilibrium(newton.predict(np.zeros_like(space.X), move))
+    except ConvergenceError as error:
+        return {"element": element, "ratio": ratio, "refused": str(error)}
     steps = newton.steps
     best = np.inf
     for _ in range(10):  # as far down as it goes
@@ -67,7 +70,9 @@ def plan_locking(quick: bool) -> list[Planned]:
 def draw_locking(axes: Sequence[Axes], points: Points) -> None:
     for element, style, colour, name in (("jbar", "o-", BLUE, r"element-constant $\bar J$"),
                                          ("plain", "s--", RED, "plain Q1")):
-        mine = [p for p in points.values() if p.get("element") == element]
+        mine = [p for p in points.values() if p["element"] == element and "force" in p]
+        refused = [p["ratio"] for p in points.values() if p["element"] == element and "refused" in p]
+        axes[1].plot(refused, [2e-6 if element == "jbar" else 8e-7] * len(refused), "x", color=colour, markersize=4)
         axes[0].plot([p["ratio"] for p in mine], [p["force"] for p in mine], style, color=colour, markersize=3.5,
                      fillstyle="none", label=name)
         axes[1].plot([p["ratio"] for p in mine], [p["rounding"] for p in mine], style, color=colour, markersize=3.5,
@@ -78,9 +83,11 @@ def draw_locking(axes: Sequence[Axes], points: Points) -> None:
     axes[1].axhline(1e-7, color="0.6", linewidth=0.6, linestyle=":")
     axes[1].annotate("tolerance of equilibria", (axes[1].get_xlim()[0], 1e-7), xytext=(3, 2), fontsize=7, color="0.4",
                      textcoords="offset points")
-    axes[1].axvline(1e6, color="0.6", linewidth=0.6, linestyle=":")
+    axes[1].axvline(2e4, color="0.6", linewidth=0.6, linestyle=":")
+    axes[1].plot([], [], "x", color="0.4", markersize=4, label="no equilibrium")
+    axes[1].legend(loc="lower right")
     axes[1].set(xscale="log", yscale="log", xlabel=r"$k/\mu$", ylabel="residual left by rounding",
-                title="Stiffness of volume and rounding")
+                title="volume so stiff that rounding shows", ylim=(1e-13, 1e-5))
     axes[0].legend()
 
 
@@ -177,16 +184,16 @@ def draw_flat(axes: Sequence[Axes], points: Points) -> None:
     axes[0].plot([p["stretch"] for p in found], [p["least"] for p in found], "o-", color=BLUE, markersize=3,
                  fillstyle="none", label="increments of 5 %")
     refused = [p["stretch"] for p in mine if p["single"]]
-    axes[0].plot(refused, np.full(len(refused), -0.85), "x", color="k", markersize=3, label="refused in one")
+    axes[0].plot(refused, np.full(len(refused), -1.9), "x", color="k", markersize=3, label="refused in one")
     refused = [p["stretch"] for p in mine if p["many"]]
-    axes[0].plot(refused, np.full(len(refused), -0.65), "+", color=BLUE, markersize=4, label="refused in increments")
-    axes[0].set(xlabel="height of the pressed block / its own", ylabel="least $J$", ylim=(-1, 1.1),
-                title="Elements pressed flat")
+    axes[0].plot(refused, np.full(len(refused), -1.7), "+", color=BLUE, markersize=4, label="refused in increments")
+    axes[0].set(xlabel="height of the pressed block / its own", ylabel="least $J$", ylim=(-2, 1.1),
+                title="Elements pressed flat", xlim=(0, 1))
     axes[1].plot([p["stretch"] for p in found], [p["energy"] for p in found], "o-", color=SAND, markersize=3)
     axes[1].axhline(1, color="0.6", linewidth=0.6, linestyle=":")
     axes[1].set(yscale="log", xlabel="height of the pressed block / its own", ylabel=r"greatest $W/\Phi$",
                 title="the sink takes them before that")
-    axes[0].legend()
+    axes[0].legend(loc="lower right", fontsize=6)
 
 
 # --- the consistent sink ---
