@@ -126,12 +126,11 @@ def draw_sweeps(axes: Sequence[Axes], points: Points) -> None:
     for k, colour, style in ((0, RED, "s--"), (1, "#c9793f", "^--"), (2, SAND, "v--"), (3, "0.5", "d--"),
                              (-1, BLUE, "o-")):
         mine = [p for p in points.values() if p["steps"] == k]
-        ax.plot([p["increments"] for p in mine], [100 * p["lost"] for p in mine], style, color=colour, markersize=3.5,
+        ax.plot([np.log2(p["increments"]) for p in mine], [100 * p["lost"] for p in mine], style, color=colour, markersize=3.5,
                 fillstyle="none", label="equilibria" if k < 0 else f"{k} Newton step" + "s" * (k != 1))
-    ax.set(xscale="log", xlabel="increments to 95 % of the onset load", ylim=(-3, 103), ylabel="mass lost (%)",
+    ax.set(xlabel="increments to 95 % of the onset load", ylim=(-3, 103), ylabel="mass lost (%)",
            title="History of states that are no equilibria")
-    ax.set_xticks([1, 2, 4, 8, 16, 32, 64], ["1", "2", "4", "8", "16", "32", "64"])
-    ax.minorticks_off()
+    ax.set_xticks(range(7), [str(2**k) for k in range(7)])
     ax.legend()
 
 
@@ -155,10 +154,8 @@ def draw_notch(axes: Sequence[Axes], points: Points) -> None:
         mine = [p for p in points.values() if p["width"] == width]
         ax.plot([1e3 * p["h"] for p in mine], [p["opening_mm"] for p in mine], style, color=colour,
                 markersize=3.5, fillstyle="none", label=name)
-    ax.set(xscale="log", xlabel="element size $h$ (µm)", ylabel="opening at the onset (mm)", ylim=(0, None),
+    ax.set(xlabel="element size $h$ (µm)", ylabel="opening at the onset (mm)", xlim=(0, None), ylim=(0, None),
            title="A notch finer than the mesh")
-    ax.set_xticks([12.5, 25, 50, 100], ["12.5", "25", "50", "100"])
-    ax.minorticks_off()
     ax.legend()
 
 

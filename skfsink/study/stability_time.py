@@ -170,13 +170,14 @@ def draw_deletion(axes: Sequence[Axes], points: Points) -> None:
     ax = axes[0]
     for floor, colour, style in ((0.0, RED, "s--"), (1e-3, BLUE, "o-")):
         mine = [p for p in points.values() if p.get("force_floor") == floor and "deletion" in p]
-        ax.plot([p["threshold"] for p in mine], [max(p["deletion"], 1e-14) for p in mine], style, color=colour,  # none is drawn as that
+        ax.plot([p["threshold"] for p in mine], [max(p["deletion"], 1e-14) for p in mine], style, color=colour,
                 markersize=3.5, fillstyle="none", label=f"force floor {floor:g}")
     ax.axhline(1e-2, color="0.6", linewidth=0.6, linestyle=":")
     ax.annotate("warning", (1e-9, 1e-2), xytext=(2, 2), textcoords="offset points", fontsize=7, color="0.4")
     ax.axvspan(1e-2, 1, color="#f6e3e1")
     ax.set(xscale="log", yscale="log", xlabel=r"$\gamma$ at which an element is deleted",
-           ylabel="energy deleted with them\n(of the onset)", xlim=(5e-10, 1), title="Deletion of elements that carry energy")
+           ylabel="energy deleted with them\n(of the onset)", xlim=(5e-10, 1),
+           title="Deletion of elements that carry energy")
     ax.legend()
 
 
