@@ -25,9 +25,10 @@ from .files import prepare_folder, replaced, write_atomic
 from .history import HISTORY_COLUMNS, History
 from .space import Space
 
-__all__ = ["HISTORY_COLUMNS", "History", "Series", "prepare_folder", "replaced", "versions", "write_atomic",
-           "write_summary"]
+__all__ = ["HISTORY_COLUMNS", "History", "Series", "frame_times", "prepare_folder", "read_summary", "replaced",
+           "versions", "write_atomic", "write_summary"]
 
+SUMMARY = "summary.json"
 VTK_ORDER = {2: [0, 1, 3, 2], 3: [0, 1, 3, 2, 4, 5, 7, 6]}  # corners of `Space.conn` in the order of VTK
 
 
@@ -102,6 +103,14 @@ class Series:
         write_atomic(self.path, '<?xml version="1.0"?>\n' + ET.tostring(root, "unicode") + "\n")
 
 
+def frame_times(path: Path) -> list[float]:
+    """Times of the frames that a PVD file names [s], or sweeps; OutputError if it is not there, or damaged."""
+    try:
+        return [float(entry.attrib["timestep"]) for entry in ET.parse(path).iter("DataSet")]
+    except (OSError, ET.ParseError, KeyError, ValueError):
+        raise OutputError(f"{path} is missing or damaged") from None
+
+
 def _field(values: np.ndarray) -> np.ndarray:
     if values.dtype == bool:
         values = values.astype(np.uint8)
@@ -119,6 +128,20 @@ def _vectors(values: np.ndarray) -> np.ndarray:
 def write_summary(path: str | Path, summary: Mapping[str, Any]) -> None:
     """Write the results of a run as JSON, arrays as lists. An OutputError names a number that is not finite."""
     write_atomic(path, json.dumps(_plain(summary, "summary"), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def read_summary(folder: Path, name: str = SUMMARY) -> dict[str, Any]:
+    """The summary of a finished run; OutputError if there is none, or it is damaged."""
+    path = folder / name
+    try:
+        summary = json.loads(path.read_text(encoding="utf-8"))
+        if not isinstance(summary, dict) or "case" not in summary:
+            raise ValueError("no summary")
+        return summary
+    except FileNotFoundError:
+        raise OutputError(f"{path.parent} holds no finished run: there is no {path.name}") from None
+    except (OSError, ValueError) as error:
+        raise OutputError(f"{path} is damaged: {error}") from None
 
 
 def _plain(value: Any, name: str) -> Any:

@@ -10,7 +10,6 @@ import contextlib
 import io
 import json
 import re
-import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,10 +20,10 @@ import numpy as np
 from .deformed import Frame
 from .errors import OutputError
 from .history import HISTORY_COLUMNS, Table, history_header
-from .output import History, write_atomic, write_summary
+from .output import SUMMARY, History, frame_times, read_summary, write_atomic, write_summary
 from .packing import Packer, pack_file, unpack_file
 from .pictures import read_frame
-from .run import SCENE, SUMMARY, read_scene
+from .run import SCENE, read_scene
 from .sample import data_folder
 from .scene import Scene
 from .space import Space
@@ -138,7 +137,7 @@ def store(run: Path, target: Path, frames: Sequence[str], velocity: Sequence[str
         raise OutputError(f"{run} holds two runs; store one of dynamic, quasistatic in it")
     scene, history = read_scene(run), History.load(run / HISTORY)
     space, quasistatic = scene.sample.space, summary["analysis"] == "quasistatic"
-    times = _times(run / "series" / "run.pvd")
+    times = frame_times(run / "series" / "run.pvd")
     event = {name: values[history["phase"] == "event"] for name, values in history.items()}
     chosen = {phrase: pick_frame(phrase, summary["moments"], times, event) for phrase in frames}
     numbers = sorted({number for number in chosen.values() if number is not None})
@@ -182,13 +181,6 @@ def _read(run: Path, number: int, time: float, dim: int) -> Frame:
         raise OutputError(f"{run} lacks frame {number}, or it is damaged: {reason.splitlines()[0]}") from None
 
 
-def _times(path: Path) -> list[float]:
-    try:
-        return [float(entry.attrib["timestep"]) for entry in ET.parse(path).iter("DataSet")]
-    except (OSError, ET.ParseError, KeyError, ValueError):
-        raise OutputError(f"{path} is missing or damaged") from None
-
-
 def _table(history: Table) -> str:
     cells = [[f"{value:.{DIGITS}g}" if values.dtype.kind == "f" else str(value) for value in values]
              for values in (history[name] for name in HISTORY_COLUMNS)]
@@ -227,17 +219,3 @@ def load(case: str, key: str) -> Reference:
 def load_coarse(case: str) -> dict[str, Any]:
     """The stored summary of the coarse mesh, with both analyses; OutputError if there is none."""
     return read_summary(reference_folder(case), COARSE)
-
-
-def read_summary(folder: Path, name: str = SUMMARY) -> dict[str, Any]:
-    """The summary of a finished run; OutputError if there is none, or it is damaged."""
-    path = folder / name
-    try:
-        summary = json.loads(path.read_text(encoding="utf-8"))
-        if not isinstance(summary, dict) or "case" not in summary:
-            raise ValueError("no summary")
-        return summary
-    except FileNotFoundError:
-        raise OutputError(f"{path.parent} holds no finished run: there is no {path.name}") from None
-    except (OSError, ValueError) as error:
-        raise OutputError(f"{path} is damaged: {error}") from None
