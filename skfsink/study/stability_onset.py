@@ -126,8 +126,8 @@ def draw_sweeps(axes: Sequence[Axes], points: Points) -> None:
     for k, colour, style in ((0, RED, "s--"), (1, "#c9793f", "^--"), (2, SAND, "v--"), (3, "0.5", "d--"),
                              (-1, BLUE, "o-")):
         mine = [p for p in points.values() if p["steps"] == k]
-        ax.plot([np.log2(p["increments"]) for p in mine], [100 * p["lost"] for p in mine], style, color=colour, markersize=3.5,
-                fillstyle="none", label="equilibria" if k < 0 else f"{k} Newton step" + "s" * (k != 1))
+        ax.plot([np.log2(p["increments"]) for p in mine], [100 * p["lost"] for p in mine], style, color=colour,
+                markersize=3.5, fillstyle="none", label="equilibria" if k < 0 else f"{k} Newton step" + "s" * (k != 1))
     ax.set(xlabel="increments to 95 % of the onset load", ylim=(-3, 103), ylabel="mass lost (%)",
            title="History of states that are no equilibria")
     ax.set_xticks(range(7), [str(2**k) for k in range(7)])
