@@ -17,7 +17,7 @@ from ..output import replaced
 from ..plot import DPI, STYLE, WIDTH
 from .pareto import pareto_front
 
-__all__ = ["draw_front", "page"]
+__all__ = ["draw_front", "listed", "page"]
 
 
 @contextmanager
@@ -60,17 +60,27 @@ def _number(decades: bool, value: float, _: int) -> str:
 
 
 def draw_front(ax: Axes, cost: Sequence[float], error: Sequence[float], names: Sequence[str],
-               colour: str = "k") -> list[int]:
-    """Draw the Pareto front of points through their corners and number its points; returns them by rising cost.
+               key: dict[str, int] | None = None, most: int = 9) -> None:
+    """Draw the Pareto front of points, and number some of them, `most` at the most and evenly spread over the errors.
 
-    The numbers are explained in a legend below the axes, by `names` of all points.
+    `key` has the number of each name, and gets those that are new; without one the names are written below the axes.
     """
     front = pareto_front(cost, error)
     x, y = np.asarray(cost, float)[front], np.asarray(error, float)[front]
-    ax.step(x, y, where="post", color=colour, linewidth=0.9, zorder=1, label="Pareto front")
-    for number, i in enumerate(front, 1):
-        ax.annotate(str(number), (cost[i], error[i]), xytext=(3, 3), textcoords="offset points", fontsize=6.5,
-                    fontweight="bold")
-    text = "\n".join(f"{number}  {names[i]}" for number, i in enumerate(front, 1))
-    ax.text(0.0, -0.22, text, transform=ax.transAxes, fontsize=6, va="top", linespacing=1.3)
-    return front
+    ax.step(x, y, where="post", color="k", linewidth=0.8, zorder=1, label="Pareto front")
+    key, below = ({}, True) if key is None else (key, False)
+    step = (y[0] / y[-1]) ** (1 / max(1, most - 1)) if len(front) > most else 1.0
+    last = np.inf
+    for k, i in enumerate(front):
+        if y[k] * step <= last * (1 + 1e-9) or k == len(front) - 1:
+            last = y[k]
+            number = key.setdefault(names[i], len(key) + 1)
+            ax.annotate(str(number), (x[k], y[k]), xytext=(3, 3), textcoords="offset points", fontsize=6.5,
+                        fontweight="bold", zorder=5)
+    if below:
+        ax.text(0.0, -0.2, listed(key), transform=ax.transAxes, fontsize=6, va="top", linespacing=1.3)
+
+
+def listed(key: dict[str, int]) -> str:
+    """The names of numbered points, a line each."""
+    return "\n".join(f"{number}  {name}" for name, number in key.items())

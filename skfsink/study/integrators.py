@@ -19,7 +19,7 @@ from matplotlib.axes import Axes
 from ..explicit import ExplicitControls
 from ..hht import HHTControls
 from .body import Body, Integrator, warm
-from .chart import draw_front, page
+from .chart import draw_front, listed, page
 from .meshes import load_plate
 from .pareto import pareto_front
 from .part import Part, Planned, Points
@@ -135,13 +135,15 @@ def summary(points: Points) -> list[dict[str, Any]]:
 
 def draw(points: Points, path: Path) -> None:
     """Error against cost, a panel a measure, with its Pareto front."""
-    rows = summary(points)
-    with page(path, "Error against cost of the integrators: crack runs 1 mm", 1, 3, 4.6) as axes:
+    rows, key = summary(points), dict[str, int]()
+    with page(path, "Error of the integrators against their cost: a crack runs 1 mm", 2, 2, 7.2) as axes:
         for ax, (name, label) in zip(axes, ERRORS.items()):
-            panel(ax, rows, name)
+            panel(ax, rows, name, key)
             ax.set_ylabel(f"relative error of the {label}")
-        handles, labels = axes[0].get_legend_handles_labels()
-        axes[0].figure.legend(handles, labels, loc="outside right upper", fontsize=6)
+        notes = axes[-1]
+        notes.set_axis_off()
+        notes.legend(*axes[0].get_legend_handles_labels(), loc="upper left", fontsize=6.5, borderaxespad=0)
+        notes.text(0.48, 1.0, listed(key), transform=notes.transAxes, fontsize=6.5, va="top", linespacing=1.3)
 
 
 #: colour and marker of each family, by line
@@ -151,7 +153,7 @@ COLOURS = {"γ every 1": "#0b3c5d", "γ every 2": "#33658a", "γ every 5": "#5b8
            "single, α -0.3": "#f2cc8f"}
 
 
-def panel(ax: Axes, rows: list[dict[str, Any]], measure: str) -> None:
+def panel(ax: Axes, rows: list[dict[str, Any]], measure: str, key: dict[str, int] | None = None) -> None:
     """Points of the methods, the front, and the reference's own uncertainty as a band."""
     good = [row for row in rows if "failed" not in row and row["family"] != "reference"]
     for line in dict.fromkeys(row["line"] for row in good):
@@ -171,7 +173,7 @@ def panel(ax: Axes, rows: list[dict[str, Any]], measure: str) -> None:
     values = [row[measure] for row in good]
     ax.set(xscale="log", yscale="log", ylim=(0.5 * min(last[measure], *values), 2 * max(values)),
            xlabel="processor time (s)")
-    draw_front(ax, [row["cost"] for row in good], values, [row["name"] for row in good])
+    draw_front(ax, [row["cost"] for row in good], values, [row["name"] for row in good], key)
 
 
 def table(points: Points) -> list[str]:
