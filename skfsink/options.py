@@ -52,8 +52,9 @@ class Options:
     Parameters
     ----------
     model
-        "auto" (the cheapest one whose measured error is within `tolerance`), or a model by name; docs/models.md lists
-        them. It sets the options of this group, `analysis`, `integrator` and `element`.
+        "auto" (the cheapest one whose measured error is within `tolerance`), or a model by name: onset, statics,
+        dynamics, full; with -half, -slab, -plane-stress, -uniform, -two-pass, -everywhere as far as the case has them.
+        It sets the options of this group, `analysis`, `integrator`, and where it has to `element` and `event_time`.
     tolerance
         Of "auto": greatest relative error of `quantity`, > 0.
     quantity
@@ -129,7 +130,8 @@ class Options:
     checkpoint_every
         Wall time between checkpoints [s], > 0.
     threads
-        Threads of the factorisations, >= 1; bits are reproducible with 1.
+        Threads that share factorisations and loops over elements, >= 0; 0 takes OMP_NUM_THREADS or the machine's cores,
+        at most 4. Runs with the same number agree to the last bit.
     out
         Output folder; default results/CASE/MESH-ANALYSIS[-INTEGRATOR].
     resume
@@ -181,7 +183,7 @@ class Options:
     record_every: Annotated[float, CONTROLS] = 1e-6
     frame_every: Annotated[float, CONTROLS] = 5e-6
     checkpoint_every: Annotated[float, CONTROLS] = 20.0
-    threads: Annotated[int, CONTROLS] = 1
+    threads: Annotated[int, CONTROLS] = 0
     out: Annotated[Path | None, OUTPUT] = None
     resume: Annotated[Path | None, OUTPUT] = None
     overwrite: Annotated[bool, OUTPUT, FLAG] = False

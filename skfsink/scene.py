@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import numba
 import numpy as np
 import tomli_w
 
@@ -64,7 +66,8 @@ class Controls:
     frame_every: time between frames of the ParaView series [s], > 0.
     balance_tolerance: balance error, relative to the onset energy, at which a run is stopped, (0, 1].
     checkpoint_every: wall time between checkpoints [s], > 0.
-    threads: of the factorisations, >= 1; runs are reproducible to the last bit with 1.
+    threads: that share factorisations and loops over elements, >= 0; 0 takes OMP_NUM_THREADS or the machine's cores,
+        at most 4. Runs with the same number agree to the last bit.
     start: of a dynamic analysis, "onset" (statics up to there) or "rest" (see :mod:`.rest`).
     active_zone: explicit steps solve for gamma only where it changes (see :mod:`.zone`).
     """
@@ -82,7 +85,7 @@ class Controls:
     frame_every: float = 5e-6
     balance_tolerance: float = 0.05
     checkpoint_every: float = 20.0
-    threads: int = 1
+    threads: int = 0
     start: str = "onset"
     active_zone: bool = True
     explicit: ExplicitControls = field(default_factory=ExplicitControls)
@@ -104,7 +107,14 @@ class Controls:
             require(name.replace("_", "-"), getattr(self, name), "s", low=0, low_open=True)
         require("aftermath", self.aftermath, "s", low=0)
         require("balance-tolerance", self.balance_tolerance, low=0, high=1, low_open=True)
-        require("threads", self.threads, low=1, high=256, whole=True)
+        require("threads", self.threads, low=0, high=256, whole=True)
+
+    @property
+    def workers(self) -> int:
+        """Number of threads to use, >= 1."""
+        asked = os.environ.get("OMP_NUM_THREADS", "")
+        cores = int(asked) if asked.isdecimal() and int(asked) else numba.config.NUMBA_NUM_THREADS
+        return self.threads or min(cores, 4)
 
 
 def _first_two(X: np.ndarray) -> np.ndarray:
