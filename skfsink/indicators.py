@@ -74,20 +74,19 @@ def element_pressure(space: Space, u: np.ndarray, bulk_modulus: float) -> np.nda
     return bulk_modulus * (space.element_mean(np.linalg.det(F)) - 1.0)
 
 
-def alternation(space: Space, pressure: np.ndarray, weight: np.ndarray | None = None) -> float:
+def alternation(space: Space, pressure: np.ndarray) -> float:
     """Amplitude [MPa] with which element pressures (ne,) alternate: rms of what a smoothing over the nodes takes away.
 
     Each element is compared with the mean over its nodes of the mean over their elements: a pressure that is linear in
-    space passes on an even mesh, a checkerboard is taken away as a whole. `weight` (ne,) of the elements, by default
-    their volume.
+    space passes on an even mesh, a checkerboard is taken away as a whole.
     """
-    weight = space.V if weight is None else space.V * weight
+    weight = space.V
     elements = np.repeat(np.arange(space.n_elements), space.conn.shape[1])
     nodes = space.conn.ravel()
     total = np.bincount(nodes, weight[elements], space.n_nodes)
-    at_nodes = np.bincount(nodes, (weight * pressure)[elements], space.n_nodes) / np.maximum(total, 1e-300)
+    at_nodes = np.bincount(nodes, (weight * pressure)[elements], space.n_nodes) / total
     rough = pressure - at_nodes[space.conn].mean(axis=1)
-    return float(np.sqrt(weight @ rough**2 / max(float(weight.sum()), 1e-300)))
+    return float(np.sqrt(weight @ rough**2 / weight.sum()))
 
 
 def mean_density(space: Space, gamma: np.ndarray) -> float:
