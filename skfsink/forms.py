@@ -22,7 +22,8 @@ from skfem.helpers import ddot, dot, grad
 
 from .kernels import ERSATZ_STIFFNESS, SOFT_GAMMA
 from .kernels.lanes import J_FLOOR
-from .material import Material
+from .material import GeneralMaterial, Material
+from .material.general import cofactor
 
 __all__ = ["DensityForms", "MomentumForms", "density_forms", "element_mean", "momentum_forms",
            "plane_stress_forms"]
@@ -54,6 +55,8 @@ def element_mean(values: Any, dV: Any) -> np.ndarray:
 
 def momentum_forms(material: Material, j_bar: bool = True) -> MomentumForms:
     """Forms of the momentum balance for `material`; `j_bar=False` gives the plain displacement element."""
+    if isinstance(material, GeneralMaterial):
+        return _general_forms(material, j_bar)
     k = material.bulk_modulus
 
     def kinematics(w: Any) -> tuple[np.ndarray, ...]:
@@ -111,6 +114,48 @@ def momentum_forms(material: Material, j_bar: bool = True) -> MomentumForms:
         geometric = gamma_bar * k * (J_bar - 1) * J * (div_a * div_b - cross)
         ersatz = np.where(gamma < SOFT_GAMMA, ERSATZ_STIFFNESS * material.shear_modulus, 0.0) * ddot(a, b)
         return isochoric + coupling + geometric + ersatz
+
+    @BilinearForm
+    def mass(a: Any, v: Any, w: Any) -> np.ndarray:
+        return w["gamma"] * material.rho0 * dot(a, v)
+
+    return MomentumForms(residual, tangent, mass)
+
+
+def _general_forms(material: GeneralMaterial, j_bar: bool) -> MomentumForms:
+    """Those of a stored energy of several invariants; the field `fibres` (ne, nq, families, 3) holds the directions."""
+    k = material.bulk_modulus
+
+    def kinematics(w: Any) -> tuple[Any, ...]:
+        H = np.moveaxis(w["displacement"].grad, (0, 1), (-2, -1))
+        dim = H.shape[-1]
+        F = np.broadcast_to(np.eye(3), (*H.shape[:-2], 3, 3)).copy()
+        F[..., :dim, :dim] += H
+        J, gamma = np.linalg.det(F), np.asarray(w["gamma"])
+        cof = np.moveaxis(cofactor(F)[..., :dim, :dim], (-2, -1), (0, 1))
+        means = (element_mean(v, w["dV"]) for v in (J, gamma)) if j_bar else (J, gamma)
+        return F, J, cof, gamma, *means
+
+    @LinearForm
+    def residual(v: Any, w: Any) -> np.ndarray:
+        F, _, cof, gamma, J_bar, gamma_bar = kinematics(w)
+        P = np.moveaxis(material.isochoric_stress(F, J_FLOOR, w["fibres"]), (-2, -1), (0, 1))
+        return ddot(gamma * P[:len(cof), :len(cof)] + gamma_bar * k * (J_bar - 1) * cof, grad(v))
+
+    @BilinearForm
+    def tangent(du: Any, v: Any, w: Any) -> np.ndarray:
+        F, J, cof, gamma, J_bar, gamma_bar = kinematics(w)
+        dim, a, b = len(cof), grad(du), grad(v)
+        A = np.moveaxis(material.isochoric_modulus(F, J_FLOOR, w["fibres"]), (-4, -3, -2, -1), (0, 1, 2, 3))
+        isochoric = np.einsum("iJ...,iJkL...,kL...->...", b, A[:dim, :dim, :dim, :dim], a)
+        dJ_a, dJ_b = ddot(cof, a), ddot(cof, b)
+        G = cof / np.maximum(J, J_FLOOR)
+        cross = np.einsum("iL...,kJ...,kL...,iJ...->...", G, G, a, b)
+        geometric = gamma_bar * k * (J_bar - 1) * J * (ddot(G, a) * ddot(G, b) - cross)
+        if j_bar:
+            dJ_a, dJ_b = element_mean(dJ_a, w["dV"]), element_mean(dJ_b, w["dV"])
+        ersatz = np.where(gamma < SOFT_GAMMA, ERSATZ_STIFFNESS * material.shear_modulus, 0.0) * ddot(a, b)
+        return gamma * isochoric + gamma_bar * k * dJ_a * dJ_b + geometric + ersatz
 
     @BilinearForm
     def mass(a: Any, v: Any, w: Any) -> np.ndarray:

@@ -6,7 +6,7 @@ import numpy as np
 
 from . import kernels
 from .errors import ParameterError
-from .material import Material
+from .material import GeneralMaterial, Material
 from .pattern import Pattern
 from .space import Space
 
@@ -47,7 +47,13 @@ class Momentum:
         self.space, self.material, self.force_floor = space, material, force_floor
         self.j_bar = element == "jbar"
         self.plane_stress = element == "planestress"
-        self.tiles = kernels.Tiles(space, self.plane_stress, threads)
+        self._fibres: np.ndarray | None = None  # directions, for laws of several invariants
+        if isinstance(material, GeneralMaterial):
+            if self.plane_stress:
+                raise ParameterError("element planestress is for laws of I1' alone; "
+                                     f"{type(material).__name__} has more invariants: take jbar")
+            self._fibres = material.fibres(space.X[space.conn].mean(axis=1))
+        self.tiles = kernels.Tiles(space, self.plane_stress, threads, self._fibres)
         self.energy = 0.0
         self.least_J = 1.0
         self.evaluations = 0
@@ -101,6 +107,9 @@ class Momentum:
         """Data of the tangent stiffness at `u` on `pattern`; with `convex` one that is positive at every point."""
         if self.plane_stress:
             return kernels.tangent_plane_stress(self.space, pattern, self.material, u, self.gamma, convex)
+        if isinstance(self.material, GeneralMaterial) and self._fibres is not None:
+            return kernels.tangent_general(self.space, pattern, self.material, u, self.gamma, self._fibres, self.j_bar,
+                                           convex)
         return kernels.tangent(self.space, pattern, self.material, u, self.gamma, self.j_bar, convex)
 
     def stiffest(self, u: np.ndarray, inverse_mass: np.ndarray) -> float:

@@ -21,7 +21,7 @@ from ..space import Space
 from .lanes import LANES, LANES_3D
 from .plane_stress import stiffness_plane_stress
 from .relax import relax
-from .shared import FORCES, VOLUMETRIC
+from .shared import FORCES, GENERAL_FORCES, VOLUMETRIC
 
 __all__ = ["Tiles"]
 
@@ -36,11 +36,14 @@ class Tiles:
     psi: gamma-weighted stored energy of each element [N mm, or N mm/mm in 2D] at the last evaluation, (tiles, lanes).
     lanes: elements in a tile.
 
+    With `fibres` (ne, families, 3), directions, `law` is one of several invariants, in plane strain or space.
+
     The loops over tiles are shared by `threads` threads, those of the machine at the most; results do not depend on
     their number.
     """
 
-    def __init__(self, space: Space, plane_stress: bool = False, threads: int = 1) -> None:
+    def __init__(self, space: Space, plane_stress: bool = False, threads: int = 1,
+                 fibres: np.ndarray | None = None) -> None:
         self.space = space
         ne, na, dim = space.n_elements, space.conn.shape[1], space.dim
         self.lanes = LANES if dim == 2 else LANES_3D
@@ -52,7 +55,8 @@ class Tiles:
         self.W = np.zeros((self.count, na, self.lanes))
         self.psi = np.zeros((self.count, self.lanes))
         self._force = np.zeros((self.count, na * dim, self.lanes))
-        self._kernels = FORCES[0 if plane_stress else dim]
+        self._kernels = FORCES[0 if plane_stress else dim] if fibres is None else GENERAL_FORCES[dim]
+        self._fibres = () if fibres is None else (self.tile(fibres.reshape(ne, -1)),)
         self.threads = min(threads, numba.config.NUMBA_NUM_THREADS)
         start, entry = space.incidence
         element, local = np.divmod(entry, na)
@@ -93,7 +97,7 @@ class Tiles:
         its element mean (the plain element, which locks).
         """
         least = min(self._share(self._kernels, law, constants, bulk_modulus, self.conn, x, self.geometry, self.gamma,
-                                j_bar, self._force, self.W, self.psi))
+                                *self._fibres, j_bar, self._force, self.W, self.psi))
         _sum_at_nodes(self._force.reshape(-1), self._start, self._offset, self.lanes, out)
         return least
 

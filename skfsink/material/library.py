@@ -1,0 +1,58 @@
+"""The materials by name, and the energy limiters that belong to their default constants."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any
+
+from ..errors import ParameterError
+from .base import Material
+from .fibres import HolzapfelGasserOgden
+from .general import MooneyRivlin
+from .isotropic import AAA, ArrudaBoyce, Gent, NeoHookean, Yeoh
+
+__all__ = ["LIMITERS", "MATERIALS", "Limiter", "material_from"]
+
+MATERIALS: dict[str, type[Material]] = {
+    "aaa": AAA, "neo-hookean": NeoHookean, "yeoh": Yeoh, "mooney-rivlin": MooneyRivlin, "gent": Gent,
+    "arruda-boyce": ArrudaBoyce, "hgo": HolzapfelGasserOgden}
+
+
+@dataclass(frozen=True)
+class Limiter:
+    """Energy limiter Phi [MPa] and sharpness m for a material's default constants, and where they come from."""
+
+    phi: float
+    m: float
+    source: str
+
+
+_TRELOAR = "assumed: strength in simple tension at a stretch of 7.6, where Treloar's curve ends"
+LIMITERS: dict[str, Limiter] = {
+    "aaa": Limiter(0.1686, 10.0, "the paper, Sec. 4"),
+    "neo-hookean": Limiter(0.1686, 10.0, "that of aaa"),
+    "yeoh": Limiter(82.0, 10.0, "Volokh, Mech. Res. Commun. 37 (2010) 684-689"),
+    "mooney-rivlin": Limiter(1.0, 10.0, _TRELOAR),
+    "gent": Limiter(1.0, 10.0, _TRELOAR),
+    "arruda-boyce": Limiter(1.0, 10.0, _TRELOAR),
+    "hgo": Limiter(0.1, 10.0, "assumed"),
+}
+
+
+def material_from(name: str, constants: Mapping[str, Any] | None = None) -> Material:
+    """The material called `name` with `constants` instead of its default ones.
+
+    Raises
+    ------
+    ParameterError
+        The name or a constant is unknown (the message lists those there are), or a value is outside its range.
+    """
+    if name not in MATERIALS:
+        raise ParameterError(f"material must be one of {', '.join(MATERIALS)}; got {name!r}")
+    kind, given = MATERIALS[name], dict(constants or {})
+    allowed = [field.name for field in fields(kind)]
+    for constant in given:
+        if constant not in allowed:
+            raise ParameterError(f"{name} has no constant {constant!r}; its constants are {', '.join(allowed)}")
+    return kind(**given)
