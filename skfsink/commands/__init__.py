@@ -1,0 +1,1 @@
+"""Commands of the program, a module each with a function of the same name."""

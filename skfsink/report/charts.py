@@ -1,0 +1,123 @@
+"""Curves of the report, of one run or of several in one picture, as SVG."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.figure import Figure
+
+from ..loader import Run
+from ..plot import STYLE
+
+__all__ = ["COLOURS", "Chart", "energy_chart", "loading_chart", "speed_chart"]
+
+#: Of the runs in their order; they differ in lightness too, and the lines in their dashes.
+COLOURS = ("#33658a", "#d1495b", "#2a9d5c", "#8a5a00", "#7b4ea3", "#4d4d4d")
+DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1.5, 1)), "-.", (0, (8, 2)), (0, (3, 1, 1, 1, 1, 1)))
+_SVG = {**STYLE, "svg.hashsalt": "skfsink", "font.size": 9, "axes.labelsize": 9, "legend.fontsize": 8,
+        "xtick.labelsize": 8, "ytick.labelsize": 8}
+_SIZE = (6.4, 3.3)  # [in]
+
+
+@dataclass(frozen=True)
+class Chart:
+    """A picture with what it says in words."""
+
+    svg: bytes
+    alt: str
+
+
+def _lines(runs: Sequence[Run], labels: Sequence[str]) -> list[tuple[Run, str, dict[str, Any]]]:
+    return [(run, label, {"color": COLOURS[i % len(COLOURS)], "linestyle": DASHES[i % len(DASHES)], "label": label})
+            for i, (run, label) in enumerate(zip(runs, labels))]
+
+
+@matplotlib.rc_context(_SVG)
+def speed_chart(runs: Sequence[Run], labels: Sequence[str],
+                waves: Sequence[tuple[float, float] | None]) -> Chart | None:
+    """Speed of the leading tip over time, with the wave speeds (c_s, c_R) [m/s] of each material that is known.
+
+    None if no run has a dynamic event.
+    """
+    figure = Figure(_SIZE, layout="constrained")
+    ax = figure.subplots()
+    said, drawn = [], []
+    for run, label, look in _lines(runs, labels):
+        event = run.event
+        if run.analysis != "dynamic" or len(event["time_s"]) < 2:
+            continue
+        speed = event["tip_speed_m_per_s"]
+        ax.plot(event["time_s"] * 1e6, speed, **look)
+        drawn.append((waves[list(labels).index(label)], look["color"]))
+        said.append(f"{label}: at most {np.nanmax(speed):.3g} m/s")
+    if not said:
+        return None
+    known = {pair for pair, _ in drawn if pair is not None}
+    for pair in sorted(known):
+        colour = "0.25" if len(known) == 1 else next(colour for wave, colour in drawn if wave == pair)
+        for value, name, dashes in zip(pair, ("c_s", "c_R"), ("-", "--")):
+            ax.axhline(value, color=colour, linewidth=0.8, linestyle=dashes, label=f"${name}$ = {value:.1f} m/s")
+        said.append(f"shear wave speed c_s {pair[0]:.3g} m/s, Rayleigh wave speed c_R {pair[1]:.3g} m/s")
+    ax.set(xlabel="time since onset (µs)", ylabel="speed of the leading tip (m/s)", ylim=(0, None), xmargin=0)
+    figure.legend(loc="outside upper left", ncols=3)
+    return Chart(_svg(figure), "Speed of the leading tip over time. " + "; ".join(said) + ".")
+
+
+@matplotlib.rc_context(_SVG)
+def energy_chart(runs: Sequence[Run], labels: Sequence[str]) -> Chart | None:
+    """U and D over the length of the crack, on which dynamic and quasi-static runs can be compared; None if no crack
+    grew."""
+    figure = Figure(_SIZE, layout="constrained")
+    axes = figure.subplots(1, 2, sharex=True)
+    said = []
+    for run, label, look in _lines(runs, labels):
+        event = run.event
+        length = event["crack_length_mm"]
+        if not len(length) or not np.nanmax(length) > 0:
+            continue
+        parts = event["U_paper"], event["sink_stored"] + event["sink_kinetic"]
+        unit = event.units["U_paper"]
+        for ax, name, values in zip(axes, "UD", parts):
+            ax.plot(length, values, **look)
+            ax.set(title=f"${name}$", xlabel="length of the crack (mm)", ylim=(0, None), xlim=(0, None))
+        axes[0].set_ylabel(f"energy ({unit})")
+        said.append(f"{label}: U {parts[0][-1]:.3g}, D {parts[1][-1]:.3g} {unit} at the end")
+    if not said:
+        return None
+    if len(runs) > 1:
+        figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper left", ncols=3)
+    return Chart(_svg(figure), "U and D over the length of the crack. " + "; ".join(said) + ".")
+
+
+@matplotlib.rc_context(_SVG)
+def loading_chart(runs: Sequence[Run], labels: Sequence[str]) -> Chart | None:
+    """Load over the displacement of the grips up to the onset; None if no run was loaded in more than one step."""
+    figure = Figure((_SIZE[0], 2.6), layout="constrained")
+    ax = figure.subplots()
+    said = []
+    for run, label, look in _lines(runs, labels):
+        rows = run.history["phase"] == "loading"
+        if rows.sum() < 2:
+            continue
+        x, y = (run.history[name][rows] for name in ("grip_displacement_mm", "reaction_N_per_mm"))
+        unit = run.history.units["reaction_N_per_mm"]
+        ax.plot(np.append(0, x), np.append(0, y), marker=".", **look)
+        ax.set(ylabel=f"load ({unit})")
+        said.append(f"{label}: {y[-1]:.3g} {unit} at {x[-1]:.3g} mm")
+    if not said:
+        return None
+    ax.set(xlabel="displacement of the grips (mm)", xlim=(0, None), ylim=(0, None))
+    if len(runs) > 1:
+        figure.legend(loc="outside upper left", ncols=3)
+    return Chart(_svg(figure), "Load over displacement up to the onset. " + "; ".join(said) + ".")
+
+
+def _svg(figure: Figure) -> bytes:
+    file = io.BytesIO()
+    figure.savefig(file, format="svg", metadata={"Date": None, "Creator": None})
+    return file.getvalue()

@@ -1,0 +1,172 @@
+"""The page: what runs have left in their folders, put into the template with every picture inside."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from .. import __version__
+from ..citation import BIBTEX, CITATIONS, DOI
+from ..errors import OutputError, SkfsinkError
+from ..files import reported, write_atomic
+from ..loader import Run, load
+from . import charts
+from .scenes import command_line, differences, parameter_table, run_labels
+from .tables import EMPTY, Row, Table, cost_table, energy_table, key_table, version_table
+
+__all__ = ["report_page", "write_report"]
+
+_KINDS = {".png": "image/png", ".gif": "image/gif", ".svg": "image/svg+xml"}
+#: Pictures of a run: file, title, what it shows.
+PICTURES = (
+    ("density.png", "Relative density", "Relative density γ on the deformed body at the key moments"),
+    ("speed.png", "Speed of the material", "Speed of the material on the deformed body at the key moments"),
+    ("energies.png", "Energy ledger", "Where the energy of the event is over time, stacked, and what does not add up"),
+    ("tip.png", "Tip of the crack", "Length of the crack, position and speed of its leading tip, and branches"),
+)
+_CARDS = ("displacement of the grips at the onset", "load at the onset", "first arrival of the crack at an edge",
+          "mean speed of the tip up to there", "U at the first arrival", "D at the first arrival")
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture with everything inside: its `data:` address, title and words for those who cannot see it."""
+
+    source: str
+    title: str
+    alt: str
+
+
+@dataclass(frozen=True)
+class Part:
+    """A run on the page."""
+
+    label: str
+    what: str
+    pictures: tuple[Picture, ...]
+    animation: Picture | None
+    warnings: tuple[str, ...]
+    assumed: tuple[str, ...]
+    choice: tuple[Row, ...]
+    choice_text: str
+    parameters: Table
+    command: str
+    finished: bool
+
+
+def write_report(folders: Sequence[Path], out: Path | None = None) -> Path:
+    """Write the report of one run, or of several compared, and return its path.
+
+    Parameters
+    ----------
+    folders: of runs, finished or not.
+    out: file to write; default `report.html` in the folder of a single run, `comparison.html` here for several.
+
+    Raises
+    ------
+    OutputError
+        No folder, one without a run or without any event, or the file cannot be written.
+    """
+    if not folders:
+        raise OutputError("name at least one folder of a run")
+    out = out or (folders[0] / "report.html" if len(folders) == 1 else Path("comparison.html"))
+    if out.is_dir():
+        raise OutputError(f"the report cannot be written to {out}: that is a folder; name a file with --out")
+    write_atomic(out, report_page([load(folder) for folder in folders]))
+    return out
+
+
+def report_page(asked: Sequence[Run]) -> str:
+    """The page as text, for the runs in these folders."""
+    runs = [part for run in asked for part in run.runs]
+    for run in runs:
+        if run.analysis == "both" or not run.event["step"].size:
+            raise OutputError(f"the run in {run.folder} has not come to its event yet: there is nothing to report")
+    labels = run_labels(runs)
+    waves = [_waves(run) for run in runs]
+    keys = key_table(runs, labels, waves)
+    several = len(runs) > 1
+    drawn = [(title, chart) for title, chart in (
+        ("Speed of the tip", charts.speed_chart(runs, labels, waves)),
+        ("Energies over the length of the crack", charts.energy_chart(runs, labels)),
+        ("Loading", charts.loading_chart(runs, labels))) if chart is not None]
+    environment = Environment(loader=PackageLoader("skfsink.report", ""), autoescape=True, undefined=StrictUndefined,
+                              trim_blocks=True, lstrip_blocks=True)
+    environment.filters["symbols"] = _symbols
+    comparisons = [_picture(run.folder / "comparison.png", "Dynamic beside quasi-static",
+                            "The dynamic crack beside the quasi-static one, and the energies of both at the end")
+                   for run in asked if run.parts]
+    return environment.get_template("page.html").render(
+        title=_title(asked), several=several, labels=labels, keys=keys,
+        cards=[] if several else [row for row in keys.rows if row.name in _CARDS],
+        charts={title: Picture(_data(chart.svg, ".svg"), title, chart.alt) for title, chart in drawn},
+        comparisons=[picture for picture in comparisons if picture], energies=energy_table(runs, labels),
+        parts=[_part(run, label) for run, label in zip(runs, labels)],
+        differences=differences(runs, labels) if several else None,
+        same_assumed=len({run.assumed for run in runs}) == 1, cost=cost_table(runs, labels),
+        versions=version_table(runs, labels), citations=CITATIONS, bibtex=BIBTEX, doi=DOI, version=__version__)
+
+
+def _title(asked: Sequence[Run]) -> str:
+    names = list(dict.fromkeys(run.case.replace("_", " ") for run in asked))
+    if len(asked) > 1:
+        return f"{len(asked)} runs compared: {', '.join(names)}"
+    run = asked[0]
+    return f"{names[0].capitalize()}, mesh {Path(str(run.parameters.get('mesh', ''))).stem}, {_kind(run)}"
+
+
+def _kind(run: Run) -> str:
+    if run.analysis == "both":
+        return "dynamic and quasi-static"
+    return "quasi-static" if run.analysis == "quasistatic" else f"dynamic ({run.parameters.get('integrator')})"
+
+
+def _part(run: Run, label: str) -> Part:
+    pictures = (_picture(run.folder / name, title, alt) for name, title, alt in PICTURES)
+    choice = run.summary.get("model") or run.choice
+    rows = tuple(Row(name.replace("_", " "), "", (_flat(value),)) for name, value in choice.items() if name != "text")
+    return Part(label, f"{run.case.replace('_', ' ')}, mesh {run.parameters.get('mesh', EMPTY)}, {_kind(run)}",
+                tuple(picture for picture in pictures if picture),
+                _picture(run.folder / "animation.gif", "Animation", "Relative density on the deformed body, moving"),
+                tuple(run.warnings), run.assumed, rows, str(choice.get("text", "")), parameter_table(run),
+                command_line(run), run.finished)
+
+
+def _flat(value: object) -> str:
+    if isinstance(value, dict):
+        return ", ".join(f"{name.replace('_', ' ')} {_flat(item)}" for name, item in value.items())
+    if isinstance(value, list):
+        return ", ".join(map(str, value))
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def _waves(run: Run) -> tuple[float, float] | None:
+    try:
+        material = run.scene.material
+    except SkfsinkError:  # a mesh file that is gone, for instance; the report says that the speeds are not known
+        return None
+    return material.shear_wave_speed, material.rayleigh_wave_speed
+
+
+def _picture(path: Path, title: str, alt: str) -> Picture | None:
+    if not path.is_file():
+        return None
+    with reported(f"cannot read {path}"):
+        return Picture(_data(path.read_bytes(), path.suffix), title, alt)
+
+
+def _data(content: bytes, suffix: str) -> str:
+    return f"data:{_KINDS[suffix]};base64,{base64.b64encode(content).decode()}"
+
+
+def _symbols(text: str) -> Markup:
+    """Wave speeds with their index below the line."""
+    escaped = str(Markup.escape(text))
+    for index in "sR":
+        escaped = escaped.replace(f"c_{index}", f"<i>c</i><sub>{index}</sub>")
+    return Markup(escaped)

@@ -1,0 +1,159 @@
+"""Tables of the report: a row for each figure, a column for each run."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..loader import ENERGIES, Run
+
+__all__ = ["Row", "Table", "cost_table", "energy_table", "key_table", "number", "version_table"]
+
+EMPTY = "–"
+
+
+@dataclass(frozen=True)
+class Row:
+    """A line of a table: what it is, its unit ("" for none), and a cell for each run."""
+
+    name: str
+    unit: str
+    cells: tuple[str, ...]
+
+    @property
+    def empty(self) -> bool:
+        """Whether no run has it."""
+        return all(cell == EMPTY for cell in self.cells)
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows under the names of their columns."""
+
+    caption: str
+    columns: tuple[str, ...]
+    rows: tuple[Row, ...]
+
+
+def number(value: Any) -> str:
+    """A value as it is printed: four digits of a float, groups of three of a whole number, a dash for none."""
+    if value is None or value == "" or (isinstance(value, float) and not math.isfinite(value)):
+        return EMPTY
+    if isinstance(value, bool | np.bool_):
+        return "yes" if value else "no"
+    if isinstance(value, int | np.integer):
+        return f"{value:,}"
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def _row(name: str, unit: str | Sequence[str], values: Sequence[Any]) -> Row:
+    """A row; where the units of the runs differ they stand in the cells."""
+    units = [unit] * len(values) if isinstance(unit, str) else list(unit)
+    cells = [number(value) for value in values]
+    if len(set(units)) == 1:
+        return Row(name, units[0], tuple(cells))
+    return Row(name, "", tuple(cell if cell == EMPTY else f"{cell} {own}" for cell, own in zip(cells, units)))
+
+
+def _table(caption: str, labels: Sequence[str], rows: Sequence[Row]) -> Table:
+    return Table(caption, tuple(labels), tuple(row for row in rows if not row.empty))
+
+
+def _get(run: Run, *keys: str) -> Any:
+    value: Any = run.summary
+    for key in keys:
+        value = value.get(key) if isinstance(value, dict) else None
+    return value
+
+
+def _scaled(factor: float, *keys: str) -> Callable[[Run], Any]:
+    def get(run: Run) -> Any:
+        value = _get(run, *keys)
+        return None if value is None else value * factor
+    return get
+
+
+def _fastest(run: Run) -> Any:
+    speed = run.event["tip_speed_m_per_s"]
+    return float(np.nanmax(speed)) if run.analysis == "dynamic" and np.isfinite(speed).any() else None
+
+
+def _share(wave: tuple[float, float] | None, speed: Any, which: int) -> Any:
+    return None if wave is None or speed is None else speed / wave[which]
+
+
+def key_table(runs: Sequence[Run], labels: Sequence[str], waves: Sequence[tuple[float, float] | None]) -> Table:
+    """The figures that a run is made for; `waves` are the wave speeds (c_s, c_R) [m/s] where they are known."""
+    units = [run.history.units for run in runs]
+    force, energy = [u["reaction_N_per_mm"] for u in units], [u["elastic"] for u in units]
+    fastest = [_fastest(run) for run in runs]
+    mean = [_get(run, "event", "mean_tip_speed_m_per_s") for run in runs]
+
+    def row(name: str, unit: str | Sequence[str], *keys: str, factor: float = 0.0) -> Row:
+        get = _scaled(factor, *keys) if factor else lambda run: _get(run, *keys)
+        return _row(name, unit, [get(run) for run in runs])
+
+    rows = [
+        row("displacement of the grips at the onset", "mm", "onset", "displacement_mm"),
+        row("load at the onset", force, "onset", "reaction_N_per_mm"),
+        row("elastic energy at the onset", energy, "onset", "elastic_energy"),
+        row("first arrival of the crack at an edge", "µs", "event", "first_arrival_s", factor=1e6),
+        row("first arrival of the crack at an edge", "sweep", "event", "first_arrival_sweep"),
+        _row("mean speed of the tip up to there", "m/s", mean),
+        _row("mean speed over c_R", "", [_share(w, v, 1) for w, v in zip(waves, mean)]),
+        _row("greatest speed of the tip", "m/s", fastest),
+        _row("greatest speed over c_R", "", [_share(w, v, 1) for w, v in zip(waves, fastest)]),
+        row("branches", "", "event", "max_branches"),
+        row("came apart", "", "event", "separated"),
+        row("U at the first arrival", energy, "energy", "U_paper_at_arrival"),
+        row("D at the first arrival", energy, "energy", "D_sink_at_arrival"),
+        row("failed elements", "", "deleted_elements"),
+        row("balance error, of the onset energy", "%", "energy", "balance_error_relative", factor=100.0),
+    ]
+    if any(_get(run, "whole", name) not in (None, 1.0) for run in runs for name in ("energy", "load", "displacement")):
+        rows += [row(f"of the whole sample: {name}", unit, "quantities", key) for name, unit, key in (
+            ("load at the onset", force, "onset_load"), ("displacement at the onset", "mm", "onset_displacement"),
+            ("U at the first arrival", energy, "U"), ("D at the first arrival", energy, "D"))]
+    return _table("Key figures", labels, rows)
+
+
+def energy_table(runs: Sequence[Run], labels: Sequence[str]) -> Table:
+    """Where the energy of the event is at its start, at the first arrival and at the end, three columns a run."""
+    tables = [run.energies for run in runs]
+    rows = []
+    for name, _, meaning in ENERGIES:
+        energies = [table.get(name) for table in tables]
+        values = [value for e in energies for value in ((e.start, e.arrival, e.end) if e else (None,) * 3)]
+        units = [u for run in runs for u in [run.history.units["elastic"]] * 3]
+        rows.append(_row(meaning, units, values))
+    columns = [f"{label}, {moment}" if len(runs) > 1 else moment for label in labels
+               for moment in ("start", "first arrival", "end")]
+    return _table("Energies of the event", columns, rows)
+
+
+def cost_table(runs: Sequence[Run], labels: Sequence[str]) -> Table:
+    """What the runs have cost."""
+    def row(name: str, unit: str, *keys: str) -> Row:
+        return _row(name, unit, [_get(run, *keys) for run in runs])
+
+    walls = [_get(run, "cost", "wall_s") or {} for run in runs]
+    phases = list(dict.fromkeys(phase for wall in walls for phase in wall))
+    rows = [_row(f"wall time, {phase}", "s", [wall.get(phase) for wall in walls]) for phase in phases]
+    rows.append(_row("wall time, in all", "s", [sum(wall.values()) if wall else None for wall in walls]))
+    rows += [row("steps or sweeps", "", "cost", "steps"), row("solves for γ", "", "cost", "gamma_solves"),
+             row("factorisations", "", "cost", "factorisations"), row("peak memory", "MB", "cost", "peak_rss_mb"),
+             row("elements", "", "elements"), row("unknowns, displacement", "", "unknowns", "displacement"),
+             row("unknowns, density", "", "unknowns", "density"),
+             _row("threads (0: as many as the machine lends)", "", [run.parameters.get("threads") for run in runs])]
+    return _table("Cost", labels, rows)
+
+
+def version_table(runs: Sequence[Run], labels: Sequence[str]) -> Table:
+    """Versions of the libraries, and the machine."""
+    found = [_get(run, "versions") or {} for run in runs]
+    names = list(dict.fromkeys(name for versions in found for name in versions))
+    return _table("Versions and machine", labels, [_row(name, "", [v.get(name) for v in found]) for name in names])
