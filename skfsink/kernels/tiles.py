@@ -57,7 +57,7 @@ class Tiles:
         self._force = np.zeros((self.count, na * dim, self.lanes))
         self._kernels = FORCES[0 if plane_stress else dim] if fibres is None else GENERAL_FORCES[dim]
         self._fibres = () if fibres is None else (self.tile(fibres.reshape(ne, -1)),)
-        self.threads = min(threads, numba.config.NUMBA_NUM_THREADS)
+        self.threads = min(threads, numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
         start, entry = space.incidence
         element, local = np.divmod(entry, na)
         tile, lane = np.divmod(element, self.lanes)
