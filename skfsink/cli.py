@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import replace
 from typing import Any, NoReturn
 
@@ -16,7 +16,7 @@ from . import __version__
 from .errors import SkfsinkError
 from .simulate import Interrupted
 
-__all__ = ["command"]
+__all__ = ["command", "run"]
 
 UNEXPECTED, BAD_INPUT, INTERRUPTED = 1, 2, 130
 
@@ -26,7 +26,6 @@ def command(function: Callable[..., Any], arguments: list[str] | None = None, pa
 
     `package` is the one whose module of the same name the function is called by: "cases" or "study".
     """
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends a run as Ctrl-C does
     given: set[str] = set()
 
     def note(app: App, commands: tuple[str, ...], found: ArgumentCollection) -> None:
@@ -35,6 +34,15 @@ def command(function: Callable[..., Any], arguments: list[str] | None = None, pa
     app = App(name=f"python -m skfsink.{package}.{function.__name__}", version=f"skfsink {__version__}", config=note,
               group_commands=Group.create_ordered("Help"))
     app.default(function)
+    run(app, arguments, given)
+
+
+def run(app: App, arguments: list[str] | None, given: Collection[str] = ()) -> NoReturn:
+    """Call what the `arguments` ask of `app`, and end the program; see :func:`command`.
+
+    `given`, complete when the call is made, goes into the options of a case.
+    """
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends a run as Ctrl-C does
     try:
         call, bound, _ = app.parse_args(arguments, exit_on_error=False, print_error=False)
         if "options" in bound.arguments:

@@ -113,7 +113,7 @@ class Controls:
     def workers(self) -> int:
         """Number of threads to use, >= 1."""
         asked = os.environ.get("OMP_NUM_THREADS", "")
-        cores = int(asked) if asked.isdecimal() and int(asked) else numba.config.NUMBA_NUM_THREADS
+        cores = int(asked) if asked.isdecimal() and int(asked) else numba.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]
         return self.threads or min(cores, 4)
 
 

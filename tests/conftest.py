@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")  # threads do not outlive a fork, and tests of resuming fork
+
 import pytest
 from bodies import Fracture, at_onset, box, notched
 

@@ -8,13 +8,15 @@ import json
 import os
 import signal
 import traceback
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import meshio
 import numpy as np
 
+from skfsink.__main__ import main
 from skfsink.cases.single_edge_notch import single_edge_notch
 from skfsink.cli import command
 
@@ -45,15 +47,25 @@ def plate(n: int = 13, side: float = 4.0, notch: float = 1.0) -> meshio.Mesh:
 
 
 def invoke(*arguments: object) -> tuple[Any, str, str]:
-    """Exit status, stderr and stdout of the command line; an exception it lets through is the caller's."""
+    """Exit status, stderr and stdout of the case's command line; an exception it lets through is the caller's."""
+    return _called(partial(command, single_edge_notch), arguments)
+
+
+def invoke_program(*arguments: object) -> tuple[Any, str, str]:
+    """The same of the program `skfsink`."""
+    return _called(main, arguments)
+
+
+def _called(program: Callable[[list[str]], Any], arguments: Sequence[object]) -> tuple[Any, str, str]:
     out, err, handler = io.StringIO(), io.StringIO(), signal.getsignal(signal.SIGTERM)
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         try:
-            command(single_edge_notch, [str(a) for a in arguments])
+            program([str(a) for a in arguments])
         except SystemExit as end:
             return end.code, err.getvalue(), out.getvalue()
         finally:
             signal.signal(signal.SIGTERM, handler)
+    raise AssertionError("a command line ends the program")
 
 
 def forked(arguments: Sequence[object], stop: int = 0, number: signal.Signals = signal.SIGKILL) -> tuple[int, str]:

@@ -1,0 +1,146 @@
+"""Decks: scenes as TOML files, with units. The `scene.toml` that a run writes is one.
+
+    case = "single_edge_notch"
+
+    [parameters]
+    side = "5 mm"
+    notch = 1.5                  # a plain number: N, mm, MPa, s; density in kg/m^3
+    density = "1433 kg/m^3"
+    mesh = "coarse"              # or a mesh file, sought from the deck's folder
+"""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import pkgutil
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+from . import cases
+from .errors import OutputError, ParameterError
+from .options import Options
+from .result import Result
+from .units import UNITS, in_unit
+
+__all__ = ["CASES", "Deck", "case_function", "parameters_of", "read_deck", "stored_case"]
+
+CASES = tuple(sorted(module.name for module in pkgutil.iter_modules(cases.__path__)))
+TOP = ("case", "parameters", "assumed", "choice")  # the last two are what a run says of itself; a deck may have them
+NOT_IN_A_DECK = ("out", "resume", "overwrite", "quiet", "corridor", "given")
+LARGEST = 1_000_000  # bytes
+
+
+@dataclass(frozen=True)
+class Deck:
+    """A scene as it was asked for: a case, and the parameters that are not to have their defaults."""
+
+    case: str
+    parameters: Mapping[str, Any]
+
+    def run(self, **output: Any) -> Result:
+        """Run it; `output` are the options that say where: out, overwrite, quiet, resume."""
+        function = case_function(self.case)
+        own = [name for name in inspect.signature(function).parameters if name != "options"]
+        shared = {name: value for name, value in self.parameters.items() if name not in own}
+        options = replace(Options(), **shared, **output, given=frozenset(self.parameters))
+        return function(**{name: self.parameters[name] for name in own if name in self.parameters}, options=options)
+
+
+def case_function(case: str) -> Callable[..., Result]:
+    """The function of a case.
+
+    Raises
+    ------
+    ParameterError
+        There is no such case.
+    """
+    if case not in CASES:
+        raise ParameterError(f"case must be one of {', '.join(CASES)}; got {case!r}")
+    function: Callable[..., Result] = getattr(importlib.import_module(f"skfsink.cases.{case}"), case)
+    return function
+
+
+def parameters_of(case: str) -> dict[str, Any]:
+    """Every parameter that a deck of `case` may have, with its default; those of the sample come first."""
+    own = {name: p.default for name, p in inspect.signature(case_function(case)).parameters.items()
+           if name != "options"}
+    options = Options()
+    return {**own, **{f.name: getattr(options, f.name) for f in fields(Options) if f.name not in NOT_IN_A_DECK}}
+
+
+def read_deck(path: Path) -> Deck:
+    """Read a deck.
+
+    Raises
+    ------
+    ParameterError
+        One line: the file is no deck, or it has a parameter, a unit or a value that cannot be.
+    """
+    try:
+        if not path.is_file():
+            raise ParameterError(f"there is no deck {path}")
+        if path.stat().st_size > LARGEST:
+            raise ParameterError(f"{path} is no deck: it has more than {LARGEST:,} bytes")
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise ParameterError(f"{path} is no deck: {reason}") from None
+    if unknown := [key for key in data if key not in TOP]:
+        raise ParameterError(f"{path}: {unknown[0]!r} is none of {', '.join(TOP)}")
+    case, parameters = data.get("case"), data.get("parameters", {})
+    if not isinstance(case, str) or not isinstance(parameters, dict):
+        raise ParameterError(f"{path}: case must be a name, one of {', '.join(CASES)}, and parameters a table")
+    try:
+        known = parameters_of(case)
+        read = {name: _value(name, value, known) for name, value in parameters.items()}
+    except ParameterError as error:
+        raise ParameterError(f"{path}: {error}") from None
+    if "mesh" in read and Path(read["mesh"]).suffix:
+        read["mesh"] = str((path.parent / read["mesh"]).absolute())
+    return Deck(case, read)
+
+
+def stored_case(folder: Path) -> str:
+    """The case of the run in a folder.
+
+    Raises
+    ------
+    OutputError
+        It holds no run.
+    """
+    path = folder / "scene.toml"
+    if not path.is_file():
+        raise OutputError(f"{folder} holds no run: there is no {path}")
+    try:
+        case = tomllib.loads(path.read_text(encoding="utf-8"))["case"]
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, KeyError) as error:
+        raise OutputError(f"{path} is not the scene of a run: {error}") from None
+    if case not in CASES:
+        raise OutputError(f"{path} is not the scene of a run: its case is {case!r}")
+    return str(case)
+
+
+def _value(name: str, value: Any, known: Mapping[str, Any]) -> Any:
+    """The value of a parameter: text with a unit becomes a number in the unit of the parameter."""
+    if name not in known:
+        raise ParameterError(f"{name!r} is no parameter; `skfsink show CASE` lists them")
+    default = known[name]
+    if isinstance(default, bool):
+        if not isinstance(value, bool):
+            raise ParameterError(f"{name} must be true or false; got {value!r}")
+        return value
+    if isinstance(default, str):
+        if not isinstance(value, str) or not value.isprintable():
+            raise ParameterError(f"{name} must be text; got {value!r}")
+        return value
+    if isinstance(value, str):
+        return in_unit(name, value, UNITS.get(name, ""))
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        unit = UNITS.get(name)
+        also = f", or text with a unit such as '1.5 {unit}'" if unit else ""
+        raise ParameterError(f"{name} must be a number{also}; got {value!r}")
+    return value

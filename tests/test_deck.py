@@ -1,0 +1,224 @@
+"""Decks: what is read from them, in which units, and what is refused."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis import strategies as st
+from plates import invoke, invoke_program, plate
+
+from skfsink.commands.show import deck_text
+from skfsink.deck import CASES, parameters_of, read_deck, stored_case
+from skfsink.errors import OutputError, ParameterError, SkfsinkError
+from skfsink.meshing import write_mesh
+from skfsink.units import UNITS, in_unit
+
+REFERENCES = sorted((Path(__file__).resolve().parents[1] / "cases").glob("*/reference/*/scene.toml"))
+
+
+def deck(folder: Path, text: str) -> Path:
+    """File of a deck."""
+    path = folder / "deck.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def parameters(folder: Path, text: str, case: str = "single_edge_notch") -> dict[str, Any]:
+    """Parameters read from a deck with these lines."""
+    return dict(read_deck(deck(folder, f'case = "{case}"\n[parameters]\n{text}\n')).parameters)
+
+
+# --- units ---
+@pytest.mark.parametrize(("text", "unit", "value"), [
+    ("5 mm", "mm", 5), ("5mm", "mm", 5), ("0.5 cm", "mm", 5), ("-2e-3 m", "mm", -2), ("60 µm/min", "mm/s", 1e-3),
+    ("1.433 g/cm^3", "kg/m^3", 1433), ("0.1686 N/mm^2", "MPa", 0.1686), ("168.6 kPa", "MPa", 0.1686),
+    ("10", "", 10), ("150 µs", "s", 1.5e-4)])
+def test_quantities(text: str, unit: str, value: float) -> None:
+    """Fails if a unit is converted wrongly."""
+    assert in_unit("x", text, unit) == pytest.approx(value, rel=1e-12)
+
+
+@pytest.mark.parametrize(("text", "unit", "said"), [
+    ("5 kg", "mm", "expected [length]"), ("5", "mm", "quantity in mm"), ("10 mm", "", "pure number"),
+    ("5 bananas", "mm", "'bananas' is no unit"), ("mm", "mm", "'1.5 mm'"), ("nan mm", "mm", "nan"),
+    ("5 mm^99", "mm", "'5 mm^99'"), ("1e9999 mm", "mm", "1e9999"), ("5 mm; import os", "mm", "import"),
+    ("5 degC", "mm", "expected [length]"), ("9" * 500, "mm", "99")])
+def test_what_is_no_quantity(text: str, unit: str, said: str) -> None:
+    """Fails if a mistake of dimension passes, or the message does not say what is expected."""
+    with pytest.raises(ParameterError, match="width must be") as error:
+        in_unit("width", text, unit)
+    assert said in str(error.value)
+    assert "\n" not in str(error.value)
+    assert len(str(error.value)) < 300
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_every_length_time_and_stress_has_a_unit(case: str) -> None:
+    """Fails if a parameter whose help names a unit has none in a deck, or another one."""
+    named = dict.fromkeys(UNITS)
+    lines = deck_text(case).splitlines()
+    comment = ""
+    for line in lines:
+        if line.startswith("#"):
+            comment += line
+        elif " = " in line:
+            name = line.split(" = ")[0]
+            unit = UNITS.get(name)
+            if unit and name != "case":
+                assert f"[{unit}]" in comment, (name, comment)
+                named[name] = unit
+            else:
+                assert not any(f"[{u}]" in comment for u in UNITS.values()), (name, comment)
+            comment = ""
+        else:
+            comment = ""
+
+
+# --- reading ---
+@pytest.mark.parametrize("case", CASES)
+def test_the_deck_that_is_shown_has_the_defaults(case: str, tmp_path: Path) -> None:
+    """Fails if `show` leaves a parameter out, or its text does not read back."""
+    read = read_deck(deck(tmp_path, deck_text(case)))
+    assert read.case == case
+    assert dict(read.parameters) == parameters_of(case)
+
+
+@pytest.mark.parametrize("path", REFERENCES, ids=lambda path: "-".join(path.parts[-4:-1:2]))
+def test_the_scene_of_a_run_is_a_deck(path: Path) -> None:
+    """Fails if what a run writes cannot be run again."""
+    read, written = read_deck(path), tomllib.loads(path.read_text())
+    assert read.case == written["case"]
+    for name, value in written["parameters"].items():
+        assert read.parameters[name] == value
+    assert stored_case(path.parent) == read.case
+
+
+def test_a_mesh_file_is_sought_from_the_folder_of_the_deck(tmp_path: Path) -> None:
+    """Fails if a deck works only from the folder it is in."""
+    assert parameters(tmp_path, 'mesh = "meshes/plate.vtu"')["mesh"] == str(tmp_path / "meshes/plate.vtu")
+    assert parameters(tmp_path, 'mesh = "coarse"')["mesh"] == "coarse"
+
+
+@pytest.mark.parametrize(("text", "said"), [
+    ("case = 5", "case must be a name"), ('case = "nothing"', "case must be one of"), ("", "case must be a name"),
+    ('case = "simple_shear"\nmesh = "M4"', "'mesh' is none of case, parameters"), ("case = ", "is no deck"),
+    ('case = "simple_shear"\n[parameters]\nsides = 5', "'sides' is no parameter"),
+    ('case = "simple_shear"\n[parameters]\nout = "/etc"', "'out' is no parameter"),
+    ('case = "simple_shear"\n[parameters]\nside = [5]', "side must be a number, or text with a unit such as '1.5 mm'"),
+    ('case = "simple_shear"\n[parameters]\nside = true', "side must be a number"),
+    ('case = "simple_shear"\n[parameters]\nside = "5 s"', "expected [length]"),
+    ('case = "simple_shear"\n[parameters]\nhalf = 1', "half must be true or false"),
+    ('case = "simple_shear"\n[parameters]\nsink = 1', "sink must be text"),
+    ('case = "simple_shear"\nparameters = 5', "parameters a table"),
+    ("a = " + "[" * 5000, "is no deck"), ("x" * 1_000_001, "more than 1,000,000 bytes")])
+def test_what_is_no_deck(text: str, said: str, tmp_path: Path) -> None:
+    """Fails if a mistake passes or gives anything but one line with the file and the cause."""
+    with pytest.raises(ParameterError) as error:
+        read_deck(deck(tmp_path, text))
+    assert said in str(error.value)
+    assert "deck.toml" in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_no_run_to_resume(tmp_path: Path) -> None:
+    """Fails if a folder without a run, or with a foreign scene, is not refused."""
+    with pytest.raises(OutputError, match="holds no run"):
+        stored_case(tmp_path)
+    (tmp_path / "scene.toml").write_text('case = "../../etc"\n')
+    with pytest.raises(OutputError, match="its case is"):
+        stored_case(tmp_path)
+
+
+# --- hostile ---
+VALUES = st.one_of(st.integers(), st.floats(), st.booleans(), st.text(max_size=30), st.sampled_from(
+    ["5 mm", "1e-3 mm/s", "inf", "../../x.vtu", "\u0000", "1 MPa", "jbar", "auto", "0", "-1 mm", "9" * 40]))
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    return repr(value) if isinstance(value, int | float) else '"' + "".join(
+        f"\\u{ord(c):04x}" if ord(c) < 0x10000 and not 0xD800 <= ord(c) < 0xE000 else "?" for c in value) + '"'
+
+
+def _no_traceback(path: Path) -> None:
+    before = sorted(path.parent.iterdir())
+    try:
+        read_deck(path)
+    except SkfsinkError as error:
+        assert len(str(error).splitlines()) == 1
+    assert sorted(path.parent.iterdir()) == before
+
+
+ODD = settings(max_examples=300, deadline=None, database=None,
+               suppress_health_check=[HealthCheck.function_scoped_fixture])
+MANY = settings(ODD, max_examples=5000)
+BYTES = st.binary(max_size=300)
+TABLES = st.dictionaries(st.sampled_from([*parameters_of("dog_bone"), "x", ""]), VALUES, max_size=8)
+
+
+def check_bytes(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "deck.toml"
+    path.write_bytes(content)
+    _no_traceback(path)
+
+
+def check_table(tmp_path: Path, case: str, table: dict[str, Any]) -> None:
+    lines = [f'"{name}" = {_toml(value)}' for name, value in table.items()]
+    check_bytes(tmp_path, "\n".join([f'case = "{case}"', "[parameters]", *lines]).encode())
+
+
+@ODD
+@given(BYTES)
+@example(b"\xff\xfe")
+def test_any_bytes(tmp_path: Path, content: bytes) -> None:
+    """Fails if bytes that are no deck give anything but one line."""
+    check_bytes(tmp_path, content)
+
+
+@ODD
+@given(st.sampled_from(CASES), TABLES)
+def test_any_values(tmp_path: Path, case: str, table: dict[str, Any]) -> None:
+    """Fails if a value of any kind gives anything but one line."""
+    check_table(tmp_path, case, table)
+
+
+@pytest.mark.slow
+@MANY
+@given(BYTES, st.integers(0, 10**6), st.sampled_from(CASES), TABLES)
+def test_ten_thousand_variants(tmp_path: Path, content: bytes, place: int, case: str, table: dict[str, Any]) -> None:
+    """Fails if one of 5,000 broken decks and 5,000 of odd values gives anything but one line."""
+    whole = deck_text(case).encode()
+    place %= len(whole)
+    check_bytes(tmp_path, whole[:place] + content + whole[place + len(content):])
+    check_table(tmp_path, case, table)
+
+
+# --- the program ---
+def test_run_and_resume_from_a_deck(tmp_path: Path) -> None:
+    """Fails if the program does not run a deck, or its results differ from those of the case's own command line."""
+    write_mesh(tmp_path / "plate.vtu", plate())
+    path = deck(tmp_path, 'case = "single_edge_notch"\n[parameters]\nmesh = "plate.vtu"\nphi = "160 kPa"\n'
+                          'length_scale = "0.6 mm"\nevent_time = "2 µs"\n')
+    status, err, _ = invoke_program("run", path, "--out", tmp_path / "deck", "--quiet")
+    assert status == 0, err
+    status, err, _ = invoke("--mesh", tmp_path / "plate.vtu", "--phi", 0.16, "--length-scale", 0.6,
+                            "--event-time", 2e-6, "--out", tmp_path / "flags", "--quiet")
+    assert status == 0, err
+    assert (tmp_path / "deck/history.csv").read_bytes() == (tmp_path / "flags/history.csv").read_bytes()
+    assert (tmp_path / "deck/scene.toml").read_bytes() == (tmp_path / "flags/scene.toml").read_bytes()
+    status, err, _ = invoke_program("resume", tmp_path / "deck", "--quiet")
+    assert status == 0, err
+
+
+@pytest.mark.parametrize("arguments", [["list"], ["show", "dog_bone"], ["--help"], ["run", "--help"]])
+def test_commands_that_only_say(arguments: list[str]) -> None:
+    """Fails if a command of the program cannot be called."""
+    status, err, out = invoke_program(*arguments)
+    assert (status, err) == (0, "")
+    said = {"list": "cylindrical_shell", "show": "gauge_width = ", "run": "--overwrite", "--help": "resume"}
+    assert said[arguments[0]] in out
