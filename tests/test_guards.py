@@ -390,6 +390,21 @@ def test_energy_in_deleted_elements_is_booked_as_such():
     assert booked > 1e-3 * state.ledger.initial
 
 
+def test_nodes_without_mass_stay_where_they_are():
+    """Fails if a mass floor of zero divides by the mass of dead nodes, which bear no force either."""
+    state, X = NOTCHED.onset, NOTCHED.sample.space.X
+    state.gamma[np.linalg.norm(X - (0.7, 0.5), axis=1) < 0.2] = 1e-15
+    state.time, state.step, state.ledger = 0.0, 0, Ledger()
+    scheme = NOTCHED.explicit(ExplicitControls(mass_floor=0.0))
+    scheme.begin(state)
+    dead, u = np.argmin(np.linalg.norm(X - (0.7, 0.5), axis=1)), state.u.copy()
+    assert NOTCHED.momentum.lumped_mass(0.0)[dead] == 0.0
+    for _ in range(40):
+        scheme.step(state)
+    np.testing.assert_array_equal(state.u[dead], u[dead])
+    assert np.isfinite(state.u).all() and np.isfinite(state.ledger.kinetic) and state.ledger.kinetic > 0
+
+
 @pytest.mark.parametrize("alpha", [-0.334, 0.001])
 def test_alpha_outside_its_range_is_refused(alpha: float):
     """Fails if an alpha is taken with which the scheme is unstable, or dissipates low modes."""
