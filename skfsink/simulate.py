@@ -7,6 +7,8 @@ import time
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from .checkpoint import load_checkpoint, save_checkpoint, save_state
 from .density import DensitySolver
 from .energy import Ledger
@@ -45,6 +47,7 @@ class Simulation:
         The checkpoint to resume from is missing, damaged, or of another scene or version.
     """
 
+    PATIENCE = 50.0  # a body that comes from rest in motion may take this many times `event_time` to crack
     CHECKPOINT = "checkpoint.npz"
     ONSET = "onset.npz"
 
@@ -162,7 +165,9 @@ class Simulation:
     def _integrate(self) -> None:
         state, integrator, recorder = self.state, self.integrator, self.recorder
         assert integrator is not None
-        end = self.scene.controls.event_time
+        end, cracked = self.scene.controls.event_time, 0.0
+        if self.scene.controls.start == "rest":  # the instability has yet to grow: the clock is that of the crack
+            end, cracked = self.PATIENCE * end, float(recorder.tracker.cracked_at.min())
         before = state.time
         for _ in integrator.run(state, end):
             self.counts["steps"] += 1
@@ -170,6 +175,10 @@ class Simulation:
                 self._show(state, state.time / end, f"{state.time * 1e6:.1f} µs")
             before = state.time
             if recorder.tracker.separated and state.time >= recorder.separated_at + self.scene.controls.aftermath:
+                break
+            if cracked == np.inf and recorder.tips.branches:
+                cracked = float(recorder.tracker.cracked_at.min())
+            if state.time >= cracked + self.scene.controls.event_time:
                 break
             self._pause("event")
         integrator.sync(state)
