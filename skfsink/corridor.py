@@ -132,7 +132,7 @@ def corridor_report(simulation: Simulation, folder: Path) -> dict[str, Any]:
         The folder holds no corridor.
     """
     try:
-        with np.load(folder / PATH) as stored:
+        with np.load(folder / PATH, allow_pickle=False) as stored:
             corridor = Corridor(stored["places"], float(stored["length_scale"]))
             cost = {name: round(float(stored[name]), 3) for name in ("wall_s", "mesh_s")}
             elements = int(stored["elements"])

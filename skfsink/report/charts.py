@@ -32,9 +32,16 @@ class Chart:
     alt: str
 
 
-def _lines(runs: Sequence[Run], labels: Sequence[str]) -> list[tuple[Run, str, dict[str, Any]]]:
-    return [(run, label, {"color": COLOURS[i % len(COLOURS)], "linestyle": DASHES[i % len(DASHES)], "label": label})
-            for i, (run, label) in enumerate(zip(runs, labels))]
+def _lines(runs: Sequence[Run], labels: Sequence[str], column: str = "") -> list[tuple[Run, str, dict[str, Any]]]:
+    """The runs, their labels and looks; the legend has the unit of a column of the history where the runs differ."""
+    units = [run.history.units[column] if column else "" for run in runs]
+    names = labels if len(set(units)) == 1 else [f"{label}, {unit}" for label, unit in zip(labels, units)]
+    return [(run, label, {"color": COLOURS[i % len(COLOURS)], "linestyle": DASHES[i % len(DASHES)], "label": name})
+            for i, (run, label, name) in enumerate(zip(runs, labels, names))]
+
+
+def _unit(runs: Sequence[Run], column: str) -> str:
+    return " or ".join(sorted({run.history.units[column] for run in runs}, reverse=True))
 
 
 @matplotlib.rc_context(_SVG)
@@ -75,7 +82,7 @@ def energy_chart(runs: Sequence[Run], labels: Sequence[str]) -> Chart | None:
     figure = Figure(_SIZE, layout="constrained")
     axes = figure.subplots(1, 2, sharex=True)
     said = []
-    for run, label, look in _lines(runs, labels):
+    for run, label, look in _lines(runs, labels, "U_paper"):
         event = run.event
         length = event["crack_length_mm"]
         if not len(length) or not np.nanmax(length) > 0:
@@ -85,10 +92,10 @@ def energy_chart(runs: Sequence[Run], labels: Sequence[str]) -> Chart | None:
         for ax, name, values in zip(axes, "UD", parts):
             ax.plot(length, values, **look)
             ax.set(title=f"${name}$", xlabel="length of the crack (mm)", ylim=(0, None), xlim=(0, None))
-        axes[0].set_ylabel(f"energy ({unit})")
         said.append(f"{label}: U {parts[0][-1]:.3g}, D {parts[1][-1]:.3g} {unit} at the end")
     if not said:
         return None
+    axes[0].set_ylabel(f"energy ({_unit(runs, 'U_paper')})")
     if len(runs) > 1:
         figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper left", ncols=3)
     return Chart(_svg(figure), "U and D over the length of the crack. " + "; ".join(said) + ".")
@@ -100,18 +107,18 @@ def loading_chart(runs: Sequence[Run], labels: Sequence[str]) -> Chart | None:
     figure = Figure((_SIZE[0], 2.6), layout="constrained")
     ax = figure.subplots()
     said = []
-    for run, label, look in _lines(runs, labels):
+    for run, label, look in _lines(runs, labels, "reaction_N_per_mm"):
         rows = run.history["phase"] == "loading"
         if rows.sum() < 2:
             continue
         x, y = (run.history[name][rows] for name in ("grip_displacement_mm", "reaction_N_per_mm"))
         unit = run.history.units["reaction_N_per_mm"]
         ax.plot(np.append(0, x), np.append(0, y), marker=".", **look)
-        ax.set(ylabel=f"load ({unit})")
         said.append(f"{label}: {y[-1]:.3g} {unit} at {x[-1]:.3g} mm")
     if not said:
         return None
-    ax.set(xlabel="displacement of the grips (mm)", xlim=(0, None), ylim=(0, None))
+    ax.set(ylabel=f"load ({_unit(runs, 'reaction_N_per_mm')})", xlabel="displacement of the grips (mm)",
+           xlim=(0, None), ylim=(0, None))
     if len(runs) > 1:
         figure.legend(loc="outside upper left", ncols=3)
     return Chart(_svg(figure), "Load over displacement up to the onset. " + "; ".join(said) + ".")

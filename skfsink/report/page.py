@@ -28,6 +28,7 @@ PICTURES = (
     ("speed.png", "Speed of the material", "Speed of the material on the deformed body at the key moments"),
     ("energies.png", "Energy ledger", "Where the energy of the event is over time, stacked, and what does not add up"),
     ("tip.png", "Tip of the crack", "Length of the crack, position and speed of its leading tip, and branches"),
+    ("animation.gif", "Animation", "Relative density γ on the deformed body, moving"),
 )
 _CARDS = ("displacement of the grips at the onset", "load at the onset", "first arrival of the crack at an edge",
           "mean speed of the tip up to there", "U at the first arrival", "D at the first arrival")
@@ -48,8 +49,7 @@ class Part:
 
     label: str
     what: str
-    pictures: tuple[Picture, ...]
-    animation: Picture | None
+    pictures: dict[str, Picture]
     warnings: tuple[str, ...]
     assumed: tuple[str, ...]
     choice: tuple[Row, ...]
@@ -101,12 +101,13 @@ def report_page(asked: Sequence[Run]) -> str:
     comparisons = [_picture(run.folder / "comparison.png", "Dynamic beside quasi-static",
                             "The dynamic crack beside the quasi-static one, and the energies of both at the end")
                    for run in asked if run.parts]
+    parts = [_part(run, label, several) for run, label in zip(runs, labels)]
     return environment.get_template("page.html").render(
         title=_title(asked), several=several, labels=labels, keys=keys,
         cards=[] if several else [row for row in keys.rows if row.name in _CARDS],
         charts={title: Picture(_data(chart.svg, ".svg"), title, chart.alt) for title, chart in drawn},
         comparisons=[picture for picture in comparisons if picture], energies=energy_table(runs, labels),
-        parts=[_part(run, label) for run, label in zip(runs, labels)],
+        parts=parts, titles={title for part in parts for title in part.pictures},
         differences=differences(runs, labels) if several else None,
         same_assumed=len({run.assumed for run in runs}) == 1, cost=cost_table(runs, labels),
         versions=version_table(runs, labels), citations=CITATIONS, bibtex=BIBTEX, doi=DOI, version=__version__)
@@ -126,15 +127,14 @@ def _kind(run: Run) -> str:
     return "quasi-static" if run.analysis == "quasistatic" else f"dynamic ({run.parameters.get('integrator')})"
 
 
-def _part(run: Run, label: str) -> Part:
-    pictures = (_picture(run.folder / name, title, alt) for name, title, alt in PICTURES)
+def _part(run: Run, label: str, several: bool) -> Part:
+    lead = f"{label}: " if several else ""
+    pictures = {title: _picture(run.folder / name, title, lead + alt) for name, title, alt in PICTURES}
     choice = run.summary.get("model") or run.choice
     rows = tuple(Row(name.replace("_", " "), "", (_flat(value),)) for name, value in choice.items() if name != "text")
     return Part(label, f"{run.case.replace('_', ' ')}, mesh {run.parameters.get('mesh', EMPTY)}, {_kind(run)}",
-                tuple(picture for picture in pictures if picture),
-                _picture(run.folder / "animation.gif", "Animation", "Relative density on the deformed body, moving"),
-                tuple(run.warnings), run.assumed, rows, str(choice.get("text", "")), parameter_table(run),
-                command_line(run), run.finished)
+                {title: picture for title, picture in pictures.items() if picture}, tuple(run.warnings), run.assumed,
+                rows, str(choice.get("text", "")), parameter_table(run), command_line(run), run.finished)
 
 
 def _flat(value: object) -> str:
@@ -146,9 +146,12 @@ def _flat(value: object) -> str:
 
 
 def _waves(run: Run) -> tuple[float, float] | None:
+    """Shear and Rayleigh wave speed [m/s] of a dynamic run; None where there is nothing to compare with them."""
+    if run.analysis != "dynamic":
+        return None
     try:
         material = run.scene.material
-    except SkfsinkError:  # a mesh file that is gone, for instance; the report says that the speeds are not known
+    except SkfsinkError:  # a mesh file that is gone, for instance
         return None
     return material.shear_wave_speed, material.rayleigh_wave_speed
 

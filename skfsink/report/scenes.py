@@ -10,6 +10,8 @@ from contextlib import suppress
 from dataclasses import fields
 from typing import Any
 
+import docstring_parser
+
 from ..loader import Run
 from ..options import Options
 from .tables import EMPTY, Row, Table
@@ -42,17 +44,8 @@ def meanings(case: str) -> dict[str, str]:
 
 
 def _described(documented: Any) -> dict[str, str]:
-    lines = inspect.cleandoc(documented.__doc__ or "").splitlines()
-    found: dict[str, list[str]] = {}
-    name = ""
-    for line, below in zip(lines, [*lines[1:], ""]):
-        if line.isidentifier() and below.startswith("    "):
-            name = line
-        elif line.startswith("    ") and name:
-            found.setdefault(name, []).append(line.strip())
-        else:
-            name = ""
-    return {name: " ".join(text) for name, text in found.items()}
+    parsed = docstring_parser.parse(documented.__doc__ or "")
+    return {item.arg_name: " ".join((item.description or "").split()) for item in parsed.params}
 
 
 def parameter_table(run: Run) -> Table:

@@ -38,6 +38,11 @@ class Table:
     columns: tuple[str, ...]
     rows: tuple[Row, ...]
 
+    @property
+    def units(self) -> bool:
+        """Whether a row has a unit."""
+        return any(row.unit for row in self.rows)
+
 
 def number(value: Any) -> str:
     """A value as it is printed: four digits of a float, groups of three of a whole number, a dash for none."""
