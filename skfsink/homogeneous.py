@@ -27,7 +27,7 @@ def _diagonal(*stretches: np.ndarray) -> np.ndarray:
 
 def _uniaxial(material: Material, s: np.ndarray) -> np.ndarray:
     """diag(s, b, 1/(s b)); b is s^(-1/2) without fibres, else found by bisection so that both sides are free."""
-    if not isinstance(material, GeneralMaterial):
+    if not isinstance(material, GeneralMaterial) or not material.fibres(np.zeros((1, 3))).size:
         return _diagonal(s, s**-0.5, s**-0.5)
     low, high = -2 * np.abs(np.log(s)), np.abs(np.log(s))
     for _ in range(60):

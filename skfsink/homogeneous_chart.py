@@ -23,19 +23,20 @@ COLOURS = {"uniaxial tension": BLUE, "plane strain": RED, "equibiaxial tension":
 def stress_picture(material: Material, law: SinkLaw, strengths: dict[str, Peak], path: str | File,
                    title: str = "") -> None:
     """Cauchy stress on each of `PATHS`: with the sink (full), of the stored energy alone (dashed), and `strengths`."""
-    figure = Figure((WIDTH, 3.2), layout="constrained")
+    figure = Figure((WIDTH, 3.5), layout="constrained")
     ax, side = figure.subplots(1, 2, width_ratios=[3, 2])
     for name, way in PATHS.items():
         _draw(side if way.free is None else ax, material, law, name, way, strengths[name])
     for panel, symbol, stress, letter in (
             (ax, r"stretch $\lambda$", r"Cauchy stress $\sigma$ (MPa)", "(a) tension"),
             (side, "amount of shear $k$", r"Cauchy shear stress $\tau$ (MPa)", "(b) simple shear")):
-        shown = [strengths[name].stress for name, way in PATHS.items() if (way.free is None) == (panel is side)]
-        panel.set(xlabel=symbol, ylabel=stress, title=letter, ylim=(0, 1.45 * max(shown)))
-        panel.margins(x=0)
+        shown = [(strengths[name].stress, extent(material, law, way), way.start) for name, way in PATHS.items()
+                 if (way.free is None) == (panel is side)]
+        tallest, longest, start = (max(values) for values in zip(*shown))
+        panel.set(xlabel=symbol, ylabel=stress, title=letter, ylim=(0, 1.35 * tallest),
+                  xlim=(start, start + 1.06 * (longest - start)))
     ax.plot([], [], "--", color="0.4", linewidth=0.9, label="without sink")
-    ax.plot([], [], "o", color="0.4", markersize=4, label="strength")
-    ax.legend(loc="upper left")
+    figure.legend(loc="outside lower center", ncols=2)
     figure.suptitle(title)
     kind = File(path).suffix.lstrip(".") or "png"
     with replaced(path) as part:
@@ -43,10 +44,11 @@ def stress_picture(material: Material, law: SinkLaw, strengths: dict[str, Peak],
 
 
 def _draw(ax: Axes, material: Material, law: SinkLaw, name: str, way: Path, peak: Peak) -> None:
-    found = curve(material, law, way, np.linspace(way.start, extent(material, law, way), 600))
+    end = way.start + 1.15 * (extent(material, law, way) - way.start)
+    found = curve(material, law, way, np.linspace(way.start, end, 700))
     colour = COLOURS[name]
     ax.plot(found.at, found.elastic, "--", color=colour, linewidth=0.9)
-    ax.plot(found.at, found.stress, color=colour, label=name)
+    left = found.gamma > 1e-4
+    ax.plot(found.at[left], found.stress[left], color=colour,
+            label=f"{name}: {peak.stress:#.4g} MPa at ${way.symbol}$ = {peak.at:.3f}")
     ax.plot([peak.at], [peak.stress], "o", color=colour, markersize=4)
-    ax.annotate(f"{peak.stress:.3g}", (peak.at, peak.stress), (0, 4), textcoords="offset points", ha="center",
-                fontsize=7, color=colour)

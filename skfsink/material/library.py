@@ -33,9 +33,9 @@ LIMITERS: dict[str, Limiter] = {
     "aaa": Limiter(0.1686, 10.0, "the paper, Sec. 4"),
     "neo-hookean": Limiter(0.1686, 10.0, "that of aaa"),
     "yeoh": Limiter(82.0, 10.0, "Volokh, Mech. Res. Commun. 37 (2010) 684-689"),
-    "mooney-rivlin": Limiter(11.4, 10.0, _TRELOAR),
-    "gent": Limiter(15.6, 10.0, _TRELOAR),
-    "arruda-boyce": Limiter(13.7, 10.0, _TRELOAR),
+    "mooney-rivlin": Limiter(11.36, 10.0, _TRELOAR),
+    "gent": Limiter(15.62, 10.0, _TRELOAR),
+    "arruda-boyce": Limiter(13.74, 10.0, _TRELOAR),
     "hgo": Limiter(0.027, 10.0, "assumed: strength along the axis of 1.03 MPa, as iliac adventitia has in Holzapfel, "
                    "Sommer and Regitnig, J. Biomech. Eng. 126 (2004) 657-665"),
 }
