@@ -35,6 +35,7 @@ RIPPLE = 0.08  # root mean square of the relative ripple of the element size
 RIPPLE_LENGTH = 15  # its wavelength in fine element sizes
 TYPICAL_SCALE = 1.155  # triangles of 1.155 h make quadrilaterals of size h
 TOLERANCE = 0.01  # relative, for the number of elements
+LOOSE = 0.05  # the same along a corridor, which has no number to meet
 SMALLEST = 0.25  # least area over longest diagonal, in element sizes (a square has 0.71)
 LEAST_JACOBIAN = 0.5
 ATTEMPTS = 12  # meshes that are made to meet the last three
@@ -277,7 +278,8 @@ def _judge(points: Array, quads: Indices, size: SizeField) -> tuple[float, float
     smallest, jacobian = np.min(areas / diagonals.max(axis=1) / wanted), scaled_jacobian(points, quads).min()
     if smallest <= 0 or jacobian <= 0:
         return ratio, math.inf
-    return ratio, max(abs(ratio - 1) / TOLERANCE, SMALLEST / smallest, LEAST_JACOBIAN / jacobian)
+    allowed = TOLERANCE if size.distance is None else LOOSE
+    return ratio, max(abs(ratio - 1) / allowed, SMALLEST / smallest, LEAST_JACOBIAN / jacobian)
 
 
 def _areas(cells: Array) -> Array:

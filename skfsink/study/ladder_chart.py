@@ -50,6 +50,8 @@ def _panel(ax: Axes, ladder: Ladder, quantity: str) -> None:
         at = ladder.points[name]["price_s"], float(np.clip(error, LEAST, MOST))
         ax.plot(*at, MARKERS[base], color=COLOURS[base], markersize=4.5, zorder=3)
         shown.append((at, variant.replace("-", " ") if variant else base, COLOURS[base]))
+    if not shown:
+        return
     scatter = ladder.scatter(quantity)
     if scatter is not None:
         ax.axhspan(LEAST / 2, min(max(scatter, LEAST), MOST), color="0.92", zorder=0)
