@@ -32,23 +32,30 @@ def turning(space: Space) -> tuple[float, np.ndarray]:
             lengths = np.linalg.norm(arms[0], axis=1) * np.linalg.norm(arms[1], axis=1)
             cosine = np.einsum("ei,ei->e", *arms) / lengths
             angles.append(np.arccos(np.clip(cosine, -1.0, 1.0)))
-            keys.append(np.sort(conn[:, ends], axis=1))
+            keys.append(_key(conn[:, ends], space.n_nodes))
             on_surface.append(outer[:, 2 * i + (a >> i & 1)] | outer[:, 2 * j + (a >> j & 1)])
-    places, where = np.unique(np.concatenate(keys), axis=0, return_inverse=True)
-    where = where.ravel()
+    places, where = np.unique(np.concatenate(keys), return_inverse=True)
     around = np.bincount(where, np.concatenate(angles), len(places))
     around[np.bincount(where, np.concatenate(on_surface), len(places)) == 0] = 0.0
     worst = int(np.argmax(around))
-    return float(np.degrees(around[worst]) - 180.0), space.X[places[worst]].mean(axis=0)
+    nodes = [places[worst]] if dim == 2 else divmod(int(places[worst]), space.n_nodes)
+    return float(np.degrees(around[worst]) - 180.0), space.X[[*nodes]].mean(axis=0)
+
+
+def _key(nodes: np.ndarray, n: int) -> np.ndarray:
+    """One number for each row of nodes (m, 1 to 4), whatever their order; three nodes tell the faces of hexahedra."""
+    ordered = np.sort(nodes, axis=1)[:, :3]
+    key: np.ndarray = ordered @ (n ** np.arange(ordered.shape[1] - 1, -1, -1, dtype=np.int64))
+    return key
 
 
 def _outer(space: Space) -> np.ndarray:
     """Mask (ne, 2 dim) of the faces (in 2D: sides) that belong to one element only, numbered 2 axis + side."""
     corners = np.arange(2**space.dim)
-    faces = np.stack([np.sort(space.conn[:, corners[(corners >> axis & 1) == side]], axis=1)
+    faces = np.stack([_key(space.conn[:, corners[(corners >> axis & 1) == side]], space.n_nodes)
                       for axis in range(space.dim) for side in range(2)], axis=1)
-    _, index, count = np.unique(faces.reshape(-1, faces.shape[2]), axis=0, return_inverse=True, return_counts=True)
-    mask: np.ndarray = (count == 1)[index.ravel()].reshape(faces.shape[:2])
+    _, index, count = np.unique(faces, return_inverse=True, return_counts=True)
+    mask: np.ndarray = (count == 1)[index].reshape(faces.shape)
     return mask
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import skfem
 
 from skfsink.cli import command
 from skfsink.errors import ParameterError
@@ -14,6 +15,7 @@ from skfsink.explicit import ExplicitControls
 from skfsink.hht import HHTControls
 from skfsink.indicators import alternation, inverted, turning
 from skfsink.scene import Controls
+from skfsink.space import Space
 from skfsink.statics import StaticsControls
 from skfsink.study import stability_elements, stability_onset, stability_time
 from skfsink.study.blocks import block
@@ -150,3 +152,14 @@ def test_study_writes_its_figures_pictures_and_tables(tmp_path: Path):
     assert stored["study"] == "stability" and stored["points"]["alpha/alpha 0"]["greatest"] == pytest.approx(1)
     assert (tmp_path / "stability_alpha.png").stat().st_size > 10_000
     assert "| alpha -0.05 | -0.05 | 1 |" in (tmp_path / "stability.md").read_text()
+
+
+def test_turning_of_a_surface_in_space():
+    """Fails if the angle at an edge of hexahedra is not that of the body around it: a step in a block turns by 90."""
+    lines = np.linspace(0, 1, 4)
+    whole = skfem.MeshHex.init_tensor(lines, lines, lines)
+    assert turning(Space(whole))[0] == pytest.approx(0.0, abs=1e-9)
+    x, y, _ = whole.p[:, whole.t].mean(axis=1)
+    angle, place = turning(Space(whole.remove_elements(np.flatnonzero((x < 0.3) & (y < 0.3)))))
+    assert angle == pytest.approx(90.0)
+    np.testing.assert_allclose(place[:2], 1 / 3)
