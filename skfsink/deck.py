@@ -26,7 +26,7 @@ from .options import Options
 from .result import Result
 from .units import UNITS, in_unit
 
-__all__ = ["CASES", "Deck", "case_function", "parameters_of", "read_deck", "stored_case"]
+__all__ = ["CASES", "Deck", "case_function", "parameters_of", "read_deck", "read_value", "stored_case"]
 
 CASES = tuple(sorted(module.name for module in pkgutil.iter_modules(cases.__path__)))
 TOP = ("case", "parameters", "assumed", "choice")  # the last two are what a run says of itself; a deck may have them
@@ -43,11 +43,15 @@ class Deck:
 
     def run(self, **output: Any) -> Result:
         """Run it; `output` are the options that say where: out, overwrite, quiet, resume."""
-        function = case_function(self.case)
-        own = [name for name in inspect.signature(function).parameters if name != "options"]
-        shared = {name: value for name, value in self.parameters.items() if name not in own}
-        options = replace(Options(), **shared, **output, given=frozenset(self.parameters))
-        return function(**{name: self.parameters[name] for name in own if name in self.parameters}, options=options)
+        own, options = self.check()
+        return case_function(self.case)(**own, options=replace(options, **output))
+
+    def check(self) -> tuple[dict[str, Any], Options]:
+        """The arguments of the case function, those of the sample and the options; the latter are checked."""
+        names = [name for name in inspect.signature(case_function(self.case)).parameters if name != "options"]
+        own = {name: self.parameters[name] for name in names if name in self.parameters}
+        shared = {name: value for name, value in self.parameters.items() if name not in names}
+        return own, replace(Options(), **shared, given=frozenset(self.parameters))
 
 
 def case_function(case: str) -> Callable[..., Result]:
@@ -96,7 +100,7 @@ def read_deck(path: Path) -> Deck:
         raise ParameterError(f"{path}: case must be a name, one of {', '.join(CASES)}, and parameters a table")
     try:
         known = parameters_of(case)
-        read = {name: _value(name, value, known) for name, value in parameters.items()}
+        read = {name: read_value(name, value, known) for name, value in parameters.items()}
     except ParameterError as error:
         raise ParameterError(f"{path}: {error}") from None
     if "mesh" in read and Path(read["mesh"]).suffix:
@@ -124,8 +128,14 @@ def stored_case(folder: Path) -> str:
     return str(case)
 
 
-def _value(name: str, value: Any, known: Mapping[str, Any]) -> Any:
-    """The value of a parameter: text with a unit becomes a number in the unit of the parameter."""
+def read_value(name: str, value: Any, known: Mapping[str, Any]) -> Any:
+    """The value of a parameter, `known` with its default: text with a unit becomes a number in the parameter's unit.
+
+    Raises
+    ------
+    ParameterError
+        There is no such parameter, or it has no such value.
+    """
     if name not in known:
         raise ParameterError(f"{name!r} is no parameter; `skfsink show CASE` lists them")
     default = known[name]

@@ -83,13 +83,15 @@ class DensitySolver:
               tolerance: float | None = None) -> np.ndarray:
         """Nodal gamma (n,) for the history `W_max` (ne, nq) [MPa], from the guess `gamma`.
 
-        Given a `tolerance` of the relative residual, other than the solver's, it is looked for in the active zone first.
+        Given a `tolerance` of the relative residual, other than the solver's, it looks in the active zone first.
 
         Raises
         ------
         ConvergenceError
-            The solution is not finite, or the lumped one leaves (0, 1] by more than the solver's tolerance.
+            The history is not finite, or the lumped solution leaves (0, 1] by more than the solver's tolerance.
         """
+        if not np.isfinite(W_max.max()):  # infinite, it would make a dead point in silence
+            raise ConvergenceError("the stored energy of a Gauss point is not finite: lower --courant or --hht-dt")
         sink = 1.0 / (self.law.history(W_max) + self.law.epsilon)
         if self.last_sink is not None and not _changed(sink, self.last_sink, self.unchanged):
             self.skipped += 1
@@ -101,9 +103,6 @@ class DensitySolver:
             result = self._iterate(self.pattern.matrix(data), data[self.pattern.diagonal], gamma, tolerance)
         if result is None:
             result = self._factorise(data)
-        if not np.isfinite(result).all():
-            raise ConvergenceError("the relative density is not finite: the stored energy of a Gauss point "
-                                   "overflowed; lower --courant or --hht-dt")
         if self.sink != "consistent" and not (-self._error < result.min() and result.max() < 1 + self._error):
             raise ConvergenceError(f"the relative density left (0, 1]: {result.min():.3g} to {result.max():.6g}; the "
                                    f"mesh has elements so flat that the lumped sink loses its maximum principle")

@@ -1,0 +1,82 @@
+"""A sweep from its deck to its table: folders, runs, what is left of an earlier attempt."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from ..deck import Deck, parameters_of, read_deck
+from ..errors import OutputError, require
+from ..files import reported, write_atomic
+from ..progress import Display
+from .engine import here, on_scheduler
+from .one import DECK, FAILURE, finished
+from .table import draw, read_rows, write_csv, write_parquet
+from .vary import combinations, read_variation
+
+__all__ = ["run_sweep"]
+
+
+def run_sweep(path: Path, vary: Sequence[str], out: Path, jobs: int = 1, scheduler: str = "", parquet: bool = False,
+              quiet: bool = False) -> list[dict[str, Any]]:
+    """Run the deck in `path` for every combination of `vary` (see :func:`.read_variation`); the rows of its table.
+
+    Raises
+    ------
+    ParameterError, OutputError, MissingExtra
+        What was asked for cannot be; `out` holds another sweep.
+    KeyboardInterrupt
+        The runs that went on have left checkpoints; the same call goes on with them.
+    """
+    require("jobs", jobs, low=1, high=256, whole=True)
+    deck = read_deck(path)
+    known = parameters_of(deck.case)
+    variations = [read_variation(text, known) for text in vary]
+    varied = list(combinations(variations))
+    folders = [out / _name(values) for values in varied]
+    _lay_out(deck, varied, folders)
+    names = [name for name, _ in variations]
+    with Display(quiet) as display:
+        display.phase("sweep")
+        left = [folder for folder in folders if not finished(folder)]
+        done = len(folders) - len(left)
+        display.say(f"{len(folders)} runs of {deck.case} in {out}, {done} of them done already")
+        for folder in (on_scheduler(left, scheduler) if scheduler else here(left, jobs)) if left else ():
+            done += 1
+            failed = (folder / FAILURE).read_text().strip() if (folder / FAILURE).is_file() else ""
+            display.say(f"{folder.name}: {failed or 'done'}")
+            display.update(done / len(folders), f"{done} of {len(folders)} runs")
+        rows = read_rows(folders, varied)
+        write_csv(rows, out / "sweep.csv")
+        if parquet:
+            write_parquet(rows, out / "sweep.parquet")
+        if any(row["analysis"] for row in rows):
+            draw(rows, names, out / "sweep.png")
+        display.update(1.0, str(out))
+    return rows
+
+
+def _name(values: Mapping[str, Any]) -> str:
+    return ",".join(f"{name}={value:.10g}" if isinstance(value, float) else f"{name}={value}"
+                    for name, value in values.items()).replace("/", "_")
+
+
+def _lay_out(deck: Deck, varied: Sequence[Mapping[str, Any]], folders: Sequence[Path]) -> None:
+    """Make the folders and their decks; refuse those of another sweep."""
+    texts = []
+    for values in varied:
+        whole = replace(deck, parameters={**deck.parameters, **values})
+        whole.check()
+        texts.append(tomli_w.dumps({"case": whole.case, "parameters": dict(whole.parameters)}))
+    for folder, text in zip(folders, texts):
+        present = folder / DECK
+        if present.is_file() and present.read_text(encoding="utf-8") != text:
+            raise OutputError(f"{folder} holds a run of another sweep: its {DECK} differs; choose another --out")
+    for folder, text in zip(folders, texts):
+        with reported(f"the folder {folder} cannot be made"):
+            folder.mkdir(parents=True, exist_ok=True)
+        write_atomic(folder / DECK, text)

@@ -1,0 +1,132 @@
+"""The table of a sweep, and its picture."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import MissingExtra
+from ..files import replaced, write_atomic
+from .one import FAILURE, RUN
+
+__all__ = ["FIGURES", "draw", "read_rows", "write_csv", "write_parquet"]
+
+#: columns of the table: name, unit, and where a summary has the figure
+FIGURES = (
+    ("onset_displacement", "mm", ("onset", "displacement_mm")),
+    ("onset_load", "N/mm", ("onset", "reaction_N_per_mm")),
+    ("U", "N mm/mm", ("energy", "U_paper_at_arrival")),
+    ("D", "N mm/mm", ("energy", "D_sink_at_arrival")),
+    ("tip_speed", "m/s", ("event", "mean_tip_speed_m_per_s")),
+    ("branches", "", ("event", "max_branches")),
+    ("arrival_time", "s", ("event", "first_arrival_s")),
+    ("deleted_elements", "", ("deleted_elements",)),
+)
+DRAWN = ("U", "D", "tip_speed", "branches")
+
+
+def read_rows(folders: Sequence[Path], varied: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """A row for each run: what varied, the figures of its summary (None where there are none), and its failure.
+
+    A run of both analyses gives a row for each.
+    """
+    rows = []
+    for folder, values in zip(folders, varied):
+        path, failure = folder / RUN / "summary.json", folder / FAILURE
+        summary = json.loads(path.read_text()) if path.is_file() else {}
+        parts = ([summary[name] for name in ("dynamic", "quasistatic")] if summary.get("analysis") == "both"
+                 else [summary])
+        for part in parts:
+            row = {**values, "analysis": part.get("analysis"), **{name: _look(part, at) for name, _, at in FIGURES}}
+            row["failure"] = failure.read_text().strip() if failure.is_file() else None if part else "not finished"
+            row["folder"] = folder.name
+            rows.append(row)
+    return rows
+
+
+def _look(summary: Any, at: tuple[str, ...]) -> Any:
+    for key in at:
+        summary = summary.get(key) if isinstance(summary, dict) else None
+    return summary
+
+
+def _heading(name: str) -> str:
+    unit = {figure: unit for figure, unit, _ in FIGURES}.get(name)
+    return f"{name} [{unit}]" if unit else name
+
+
+def write_csv(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
+    """Write the rows, with units in the header."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([_heading(name) for name in rows[0]])
+    writer.writerows(["" if value is None else value for value in row.values()] for row in rows)
+    write_atomic(path, text.getvalue())
+
+
+def write_parquet(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
+    """Write the rows as a Parquet file.
+
+    Raises
+    ------
+    MissingExtra
+        pyarrow is not installed.
+    """
+    try:
+        import pyarrow
+        from pyarrow import parquet
+    except ImportError as error:
+        raise MissingExtra(f"a Parquet table needs pyarrow, which cannot be imported ({error}): "
+                           f"install skfsink[sweep]") from None
+    table = pyarrow.table({_heading(name): [row[name] for row in rows] for name in rows[0]})
+    with replaced(path) as temporary:
+        parquet.write_table(table, temporary)
+
+
+def draw(rows: Sequence[Mapping[str, Any]], varied: Sequence[str], path: Path) -> None:
+    """Picture of the figures against the first parameter that varies besides the seed of the mesh.
+
+    Each run is a point; where several share a value, their mean and standard deviation are beside them.
+    """
+    import matplotlib.pyplot as plt
+
+    numeric = [name for name in varied if not isinstance(rows[0][name], str | bool)]
+    axis = next((name for name in numeric if name != "mesh_seed"), None)
+    analyses = sorted({row["analysis"] for row in rows if row["analysis"]})
+    figure, axes = plt.subplots(2, 2, figsize=(9, 6.4), sharex=True, layout="constrained")
+    units = {name: unit for name, unit, _ in FIGURES}
+    for name, plot in zip(DRAWN, axes.flat):
+        for number, analysis in enumerate(analyses):
+            pairs = np.array([(row[axis] if axis else 0.0, row[name]) for row in rows
+                              if row["analysis"] == analysis and row[name] is not None], float).reshape(-1, 2)
+            colour = f"C{number}"
+            values = np.unique(pairs[:, 0])
+            width = 0.02 * (np.ptp(values) if len(values) > 1 else 1.0)
+            plot.plot(pairs[:, 0] - width / 2, pairs[:, 1], "o", ms=4, mfc="none", color=colour, alpha=0.7)
+            groups = [pairs[pairs[:, 0] == value, 1] for value in values]
+            if any(len(group) > 1 for group in groups):
+                mean = [group.mean() for group in groups]
+                spread = [group.std(ddof=1) if len(group) > 1 else 0.0 for group in groups]
+                plot.errorbar(values + width / 2, mean, spread, fmt="s", ms=5, capsize=4, color=colour,
+                              label=f"{analysis}: mean ± standard deviation")
+            else:
+                plot.plot([], [], "o", mfc="none", color=colour, label=analysis)
+        plot.set_ylabel(f"{name.replace('_', ' ')} [{units[name]}]" if units[name] else name.replace("_", " "))
+        plot.set_ylim(bottom=0)
+        plot.grid(alpha=0.3)
+    for plot in axes[1]:
+        if axis:
+            plot.set_xlabel(axis.replace("_", " "))
+        else:
+            plot.set_xticks([0.0], [f"{len(rows)} runs"])
+            plot.set_xlim(-1, 1)
+    axes[0, 0].legend(frameon=False, fontsize=8)
+    with replaced(path) as temporary:
+        figure.savefig(temporary, dpi=150, format="png")
+    plt.close(figure)

@@ -1,0 +1,224 @@
+"""Sweeps: what varies, every run once, nothing lost, one table and one picture."""
+
+from __future__ import annotations
+
+import contextlib
+import csv
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import psutil
+import pytest
+from PIL import Image
+from plates import invoke_program, plate
+
+from skfsink.deck import parameters_of
+from skfsink.errors import OutputError, ParameterError
+from skfsink.meshing import write_mesh
+from skfsink.sweep.one import run_folder
+from skfsink.sweep.plan import run_sweep
+from skfsink.sweep.table import draw, write_parquet
+from skfsink.sweep.vary import combinations, read_variation
+
+KNOWN = parameters_of("single_edge_notch")
+
+
+@pytest.fixture
+def deck(tmp_path: Path) -> Path:
+    """Deck of a small plate whose event ends after 2 µs."""
+    write_mesh(tmp_path / "plate.vtu", plate())
+    path = tmp_path / "scene.toml"
+    path.write_text('case = "single_edge_notch"\n[parameters]\nmesh = "plate.vtu"\nlength_scale = "0.6 mm"\n'
+                    'event_time = "2 µs"\n')
+    return path
+
+
+# --- what varies ---
+@pytest.mark.parametrize(("text", "name", "values"), [
+    ("notch=1..3:5", "notch", [1, 1.5, 2, 2.5, 3]), ("mesh.seed=1..4", "mesh_seed", [1, 2, 3, 4]),
+    ("mesh-seed=0..4:3", "mesh_seed", [0, 2, 4]), ("sink=lumped, consistent", "sink", ["lumped", "consistent"]),
+    ("notch=1 mm..0.2 cm:2", "notch", [1, 2]), ("phi=100 kPa,0.2", "phi", [0.1, 0.2]),
+    ("half=true,false", "half", [True, False]),
+    ("m=5,10", "m", [5, 10]), ("deletion=1e-9,1e-3", "deletion", [1e-9, 1e-3])])
+def test_variations(text: str, name: str, values: list[object]) -> None:
+    """Fails if a range, a list or a unit is read otherwise than documented, or whole numbers become others."""
+    found, read = read_variation(text, KNOWN)
+    assert (found, read) == (name, pytest.approx(values) if isinstance(values[0], float) else values)
+    assert not isinstance(KNOWN[name], int) or all(isinstance(value, int) for value in read)
+
+
+@pytest.mark.parametrize(("text", "said"), [
+    ("notch", "NAME=A..B:N"), ("notches=1..2:3", "no such parameter"), ("notch=1..2:1", "2 to 10000"),
+    ("notch=1..2.5", "whole numbers A <= B"), ("mesh.seed=3..1", "whole numbers"), ("sink=a..b", "no range"),
+    ("notch=1 s..2:3", "expected [length]"), ("notch=1..2:1e9", "number of values"), ("out=a,b", "no such parameter"),
+    ("notch=", "NAME=A..B:N"), ("mesh.seed=1..1000000000", "whole numbers")])
+def test_what_cannot_vary(text: str, said: str) -> None:
+    """Fails if a mistake passes, or the line does not say what is meant."""
+    with pytest.raises(ParameterError) as error:
+        read_variation(text, KNOWN)
+    assert said in str(error.value)
+
+
+def test_combinations() -> None:
+    """Fails if a combination is missing, or a parameter may vary twice, or a million runs are begun."""
+    assert list(combinations([("a", [1, 2]), ("b", ["x", "y"])])) == [
+        {"a": 1, "b": "x"}, {"a": 1, "b": "y"}, {"a": 2, "b": "x"}, {"a": 2, "b": "y"}]
+    with pytest.raises(ParameterError, match="given twice"):
+        list(combinations([("a", [1]), ("a", [2])]))
+    with pytest.raises(ParameterError, match="at most 10000 runs"):
+        list(combinations([("a", list(range(200))), ("b", list(range(200)))]))
+
+
+# --- runs ---
+def starts(out: Path) -> list[str]:
+    """What the processes of all runs noted when they began."""
+    return sorted(line for path in out.glob("*/starts.log") for line in path.read_text().split())
+
+
+def table(out: Path) -> list[dict[str, str]]:
+    with (out / "sweep.csv").open() as file:
+        return list(csv.DictReader(file))
+
+
+def test_every_combination_once_a_table_and_a_picture(deck: Path, tmp_path: Path) -> None:
+    """Fails if a run is missing or made twice, if one that fails stops the others, or is not named in the table."""
+    out = tmp_path / "sweep"
+    arguments = ("sweep", deck, "--vary", "phi=0.15,0.16,0.17", "--vary", "notch_width=0.1", "--out", out, "--quiet")
+    (out / "phi=0.17,notch_width=0.1").mkdir(parents=True)
+    (out / "phi=0.17,notch_width=0.1" / "run").write_text("in the way")  # the folder of the third cannot be made
+    status, err, _ = invoke_program(*arguments, "--jobs", 2)
+    assert (status, err) == (0, "")
+    rows = table(out)
+    assert [(row["phi"], row["folder"]) for row in rows] == [
+        (phi, f"phi={phi},notch_width=0.1") for phi in ("0.15", "0.16", "0.17")]
+    assert all(float(row["onset_load [N/mm]"]) > 0 for row in rows[:2])
+    assert float(rows[0]["onset_displacement [mm]"]) < float(rows[1]["onset_displacement [mm]"])
+    assert rows[2]["failure"]
+    with Image.open(out / "sweep.png") as picture:
+        assert picture.size[0] > 1000
+    before = starts(out)
+    assert before.count("begun") >= 2
+    (out / "phi=0.17,notch_width=0.1" / "run").unlink()
+    assert invoke_program(*arguments)[0] == 0  # only the third is left
+    assert len(starts(out)) == len(before) + 1
+    assert not any(row["failure"] for row in table(out))
+    with pytest.raises(OutputError, match="another sweep"):
+        deck.write_text(deck.read_text() + 'm = 9\n')
+        run_sweep(deck, ["phi=0.15", "notch_width=0.1"], out, quiet=True)
+
+
+def test_mistakes_are_found_before_anything_is_made(deck: Path, tmp_path: Path) -> None:
+    """Fails if a sweep makes folders and only then finds that a value is out of range."""
+    status, err, _ = invoke_program("sweep", deck, "--vary", "phi=0.1,-1", "--out", tmp_path / "sweep", "--quiet")
+    assert status == 2
+    assert "phi must be" in err and err.count("\n") == 1
+    assert not (tmp_path / "sweep").exists()
+
+
+def test_picture_of_an_ensemble(tmp_path: Path) -> None:
+    """Fails if seeds are not taken together, or a figure that is missing in a run breaks the picture."""
+    random = np.random.default_rng(0)
+    rows = [{"notch": notch, "mesh_seed": seed, "analysis": "dynamic", "U": random.normal(0.1, 0.01), "D": 0.04,
+             "tip_speed": None if seed == 2 else 26.0, "branches": seed} for notch in (1.0, 2.0) for seed in (1, 2, 3)]
+    for varied in (["notch", "mesh_seed"], ["mesh_seed"], ["sink"]):
+        draw([{**row, "sink": "lumped"} for row in rows], varied, tmp_path / "sweep.png")
+        assert (tmp_path / "sweep.png").stat().st_size > 10_000
+
+
+def test_parquet_has_the_same_table(tmp_path: Path) -> None:
+    """Fails if a column, its unit or a missing figure is lost."""
+    parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed (the sweep extra)")
+    rows = [{"phi": 0.1, "U": 0.2, "failure": None}, {"phi": 0.2, "U": None, "failure": "why"}]
+    write_parquet(rows, tmp_path / "sweep.parquet")
+    assert parquet.read_table(tmp_path / "sweep.parquet").to_pylist() == [
+        {"phi": 0.1, "U [N mm/mm]": 0.2, "failure": None}, {"phi": 0.2, "U [N mm/mm]": None, "failure": "why"}]
+
+
+def test_two_processes_in_one_folder(deck: Path, tmp_path: Path) -> None:
+    """Fails if a run is made twice when two processes are given it at once."""
+    folder = tmp_path / "one"
+    folder.mkdir()
+    (folder / "deck.toml").write_text(deck.read_text().replace("plate.vtu", str(tmp_path / "plate.vtu")))
+    program = [sys.executable, "-m", "skfsink.sweep.one", str(folder)]
+    both = [subprocess.Popen(program) for _ in range(2)]
+    assert [process.wait() for process in both] == [0, 0]
+    assert (folder / "starts.log").read_text() == "begun\n"
+    run_folder(folder)
+    assert (folder / "starts.log").read_text() == "begun\n"
+
+
+# --- a scheduler whose workers are killed ---
+@pytest.fixture
+def scheduler(tmp_path: Path) -> Iterator[tuple[str, list[psutil.Process]]]:
+    """Address of a Dask scheduler in a process of its own, and two more whose children are workers.
+
+    A worker that dies is started again.
+    """
+    pytest.importorskip("distributed", reason="Dask is not installed (the sweep extra)")
+    place = tmp_path / "scheduler.json"
+    common = ["--scheduler-file", str(place), "--no-dashboard"]
+    environment = {**os.environ, "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "10"}
+
+    def begin(kind: str, *arguments: str) -> psutil.Process:
+        program = f"from distributed.cli.dask_{kind} import main; main()"
+        child = subprocess.Popen([sys.executable, "-c", program, *common, *arguments], env=environment,
+                                 stderr=subprocess.DEVNULL)
+        return psutil.Process(child.pid)
+
+    processes = [begin("scheduler", "--host", "127.0.0.1", "--port", "0")]
+    processes += [begin("worker", "--nthreads", "1", "--local-directory", str(tmp_path / f"worker{i}")) for i in (0, 1)]
+    try:
+        for _ in range(300):
+            if place.is_file() and place.stat().st_size:
+                break
+            time.sleep(0.1)
+        yield json.loads(place.read_text())["address"], processes[1:]
+    finally:
+        for process in processes:
+            for child in [*process.children(recursive=True), process]:
+                with contextlib.suppress(psutil.NoSuchProcess):
+                    child.kill()
+            process.wait()
+
+
+def running(nurses: list[psutil.Process]) -> list[tuple[psutil.Process, psutil.Process]]:
+    """Workers that have a run going on, and that run."""
+    found = []
+    for nurse in nurses:
+        with contextlib.suppress(psutil.NoSuchProcess):
+            for worker in nurse.children():
+                found += [(worker, child) for child in worker.children() if "skfsink.sweep.one" in child.cmdline()]
+    return found
+
+
+@pytest.mark.slow
+def test_a_worker_that_is_killed_loses_nothing_and_repeats_nothing(
+        deck: Path, tmp_path: Path, scheduler: tuple[str, list[psutil.Process]]) -> None:
+    """Fails if a run is lost with the worker that was given it, or is made a second time."""
+    out, (address, nurses) = tmp_path / "sweep", scheduler
+    deck.write_text(deck.read_text().replace("2 µs", "40 µs"))
+    sweep = subprocess.Popen([sys.executable, "-m", "skfsink", "sweep", str(deck), "--vary", "phi=0.14..0.17:4",
+                              "--out", str(out), "--scheduler", address, "--quiet"])
+    killed, deadline = 0, time.monotonic() + 400
+    while sweep.poll() is None and time.monotonic() < deadline:
+        pairs = running(nurses)
+        if killed < 2 and pairs and len(list(out.glob("*/run/scene.toml"))) > 2 * killed:  # one that can be resumed
+            worker, run = pairs[0]
+            worker.kill()
+            if killed == 0:
+                run.kill()  # the first with its run; the second leaves that alone
+            killed += 1
+        time.sleep(0.2)
+    assert sweep.wait(timeout=10) == 0
+    assert killed == 2
+    rows = table(out)
+    assert len(rows) == 4
+    assert all(row["onset_load [N/mm]"] and not row["failure"] for row in rows)
+    assert starts(out).count("begun") == 4
+    assert starts(out).count("resumed") == 1
