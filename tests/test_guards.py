@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import skfem
 
+from skfsink.density import DensitySolver
 from skfsink.energy import Ledger
 from skfsink.errors import ConvergenceError, InstabilityError, ParameterError
 from skfsink.explicit import Explicit, ExplicitControls
@@ -403,6 +404,17 @@ def test_nodes_without_mass_stay_where_they_are():
         scheme.step(state)
     np.testing.assert_array_equal(state.u[dead], u[dead])
     assert np.isfinite(state.u).all() and np.isfinite(state.ledger.kinetic) and state.ledger.kinetic > 0
+
+
+@pytest.mark.parametrize("sink", ["lumped", "consistent", "nearest"])
+@pytest.mark.parametrize("energy", [np.nan, np.inf])
+def test_energy_that_is_no_number_does_not_pass_into_the_density(sink: str, energy: float):
+    """Fails if a blow-up goes on as a gamma of NaN, or as a body without the points that blew up, or has no cure."""
+    W = np.full(PLAIN.space.w.shape, 0.01)
+    W[7, 2] = energy
+    solver = DensitySolver(PLAIN.space, SinkLaw(), sink)
+    with pytest.raises(ConvergenceError, match=r"is not finite: lower --courant or --hht-dt"):
+        solver.solve(W, np.ones(PLAIN.space.n_nodes))
 
 
 @pytest.mark.parametrize("alpha", [-0.334, 0.001])
