@@ -83,7 +83,7 @@ class DensitySolver:
               tolerance: float | None = None) -> np.ndarray:
         """Nodal gamma (n,) for the history `W_max` (ne, nq) [MPa], from the guess `gamma`.
 
-        Given a `tolerance` of the relative residual, other than the solver's, it is looked for in the active zone first.
+        Given a `tolerance` of the relative residual, other than the solver's, it looks in the active zone first.
 
         Raises
         ------
