@@ -98,7 +98,7 @@ class Guard:
     def _step_cure(self) -> str:
         c = self.scene.controls
         if c.analysis == "quasistatic":
-            return "lower --front, or compute with --analysis dynamic"
+            return f"raise --front (now {c.statics.front:g}), or compute with --analysis dynamic"
         if c.integrator == "explicit":
             return f"lower --courant (now {c.explicit.courant:g})"
         return f"lower --hht-dt (now {c.hht.dt:g} s)"

@@ -288,6 +288,20 @@ def test_open_ledger_of_the_loading_stops_the_run():
         watched.guard.check_onset(watched.state)
 
 
+@pytest.mark.parametrize(("controls", "cure"), [
+    ({"explicit": ExplicitControls(courant=0.7)}, r"at t = 0 s, .*lower --courant \(now 0.7\)"),
+    ({"integrator": "hht", "hht": HHTControls(dt=3e-7)}, r"at t = 0 s, .*lower --hht-dt \(now 3e-07 s\)"),
+    ({"analysis": "quasistatic"}, r"at sweep 0, .*raise --front \(now 0.8\), or compute with --analysis dynamic"),
+])
+def test_cure_is_that_of_the_method(controls: dict[str, Any], cure: str):
+    """Fails if an error tells to change an option of another method."""
+    watched = Watched(scene(**controls))
+    watched.guard.check_step(watched.state)
+    failed(30)(watched)
+    with pytest.raises(InstabilityError, match=cure):
+        watched.guard.check_step(watched.state)
+
+
 # --- whole runs ---
 def test_too_long_a_step_stops_the_run_with_the_cure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """Fails if a run whose step is too long goes on to NaN, or ends with an error that names no cure."""
