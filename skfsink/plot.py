@@ -28,7 +28,7 @@ from .output import replaced, write_atomic
 from .space import Space
 
 __all__ = ["GAMMA_MAP", "STYLE", "Frame", "animation", "comparison_picture", "density_bar", "density_picture",
-           "draw_body", "ledger_picture", "speed_picture", "tip_picture"]
+           "draw_body", "ledger_picture", "save_gif", "speed_picture", "tip_picture"]
 
 History = Mapping[str, np.ndarray]  # columns, as `output.History.load` gives them
 
@@ -143,9 +143,15 @@ def animation(space: Space, frames: Sequence[Frame], path: str | Path, seconds: 
         draw_body(ax, deformed.body(space, frame, view), frame.title)
         canvas.draw()
         pictures.append(Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB"))
-    palette = Image.fromarray(np.concatenate([*map(np.asarray, pictures[::max(1, len(pictures) // 4)])])).quantize(128)
+    save_gif(pictures, path, seconds)
+
+
+def save_gif(pictures: Sequence[Image.Image], path: str | Path, seconds: float, colours: int = 128) -> None:
+    """Pictures as an endless GIF of about `seconds` and so many colours; the last one stays for a while."""
+    some = np.concatenate([*map(np.asarray, pictures[::max(1, len(pictures) // 4)])])
+    palette = Image.fromarray(some).quantize(colours)
     images = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
-    duration = [max(20, int(1000 * seconds / (len(frames) + 5)))] * len(frames)
+    duration = [max(20, int(1000 * seconds / (len(pictures) + 5)))] * len(pictures)
     duration[-1] *= 6  # the end stays for a while
     file = io.BytesIO()
     images[0].save(file, "GIF", save_all=True, append_images=images[1:], duration=duration, loop=0)

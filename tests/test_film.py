@@ -1,0 +1,79 @@
+"""Pictures of bodies in space from the files of a run, still and moving."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from references import STEP, TIPS, scene_of, write_run
+
+import skfsink
+from skfsink.cli import command
+from skfsink.commands.render import render
+from skfsink.deformed import body
+from skfsink.errors import OutputError, ParameterError
+from skfsink.film import camera_of, film, still
+from skfsink.pictures import read_frame
+from skfsink.render import bounds
+
+pytest.importorskip("pyvista", reason="pyvista, the extra view, is not installed")
+
+
+@pytest.fixture(scope="module")
+def shell(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A made-up run of the shell."""
+    return write_run(tmp_path_factory.mktemp("film") / "shell", scene_of("cylindrical_shell"))
+
+
+def test_the_camera_sees_what_the_other_pictures_show(shell: Path) -> None:
+    """Fails if azimuth or elevation mean something else than in `density.png`."""
+    scene = skfsink.load(shell).scene
+    frame, space = read_frame(shell / "series" / "run_0000.vtu", 0.0, "", 3), scene.sample.space
+    seen = bounds(space, [frame], camera_of(scene.view), margin=0.0)
+    np.testing.assert_allclose(body(space, frame, scene.view).box, seen, atol=1e-6)
+
+
+
+def test_a_film_has_every_frame_and_moves(shell: Path, tmp_path: Path) -> None:
+    """Fails if a frame is left out, or the crack does not open more and more of the shell."""
+    film(skfsink.load(shell), tmp_path / "film.gif", width=240, seconds=2.0)
+    with Image.open(tmp_path / "film.gif") as gif:
+        assert gif.n_frames == len(TIPS) and gif.width == 240
+        dark = []
+        for i in range(gif.n_frames):
+            gif.seek(i)
+            picture = np.asarray(gif.convert("RGB"), float)[:, :190]  # beside the bar
+            dark.append(int(((picture.max(axis=2) - picture.min(axis=2)) > 60).sum()))
+    assert dark == sorted(dark) and dark[-1] > 2 * dark[0]
+
+
+def test_a_still_by_the_command(shell: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Fails if the picture is not where it is said to be, or not of the moment and field asked for."""
+    for field in ("gamma", "speed"):
+        with pytest.raises(SystemExit) as end:
+            command(render, [str(shell), "--moment", "arrival", "--field", field, "--width", "300", "--azimuth", "90"],
+                    package="commands")
+        assert end.value.code == 0 and capsys.readouterr().out == f"{shell / f'{field}-arrival.png'}\n"
+    pictures = [np.asarray(Image.open(shell / f"{field}-arrival.png").convert("RGB")) for field in ("gamma", "speed")]
+    assert pictures[0].shape == pictures[1].shape and pictures[0].shape[1] == 300
+    assert np.abs(pictures[0].astype(float) - pictures[1]).mean() > 10
+    still(skfsink.load(shell), tmp_path / "other.jpg", 3, width=300, view=(90.0, 25.0))
+    with Image.open(tmp_path / "other.jpg") as picture:
+        assert picture.format == "JPEG"
+        assert np.abs(np.asarray(picture, float) - pictures[0]).mean() < 3  # arrival is frame 3
+    assert skfsink.load(shell).frames.times[3] == 3 * STEP
+
+
+def test_refusals(shell: Path, tmp_path: Path) -> None:
+    """Fails if what cannot be shown is not one line that says what can."""
+    run = skfsink.load(shell)
+    with pytest.raises(ParameterError, match=r"^field must be one of gamma, speed; got 'stress'$"):
+        still(run, tmp_path / "a.png", field="stress")
+    with pytest.raises(OutputError, match=r"has no frame 9; it has onset, branching, arrival, end, or 0 to 5$"):
+        still(run, tmp_path / "a.png", 9)
+    plate = skfsink.load(write_run(tmp_path / "plate", scene_of("single_edge_notch")))
+    with pytest.raises(OutputError, match=r"holds a plane body: its pictures are density.png and animation.gif"):
+        film(plate, tmp_path / "a.gif")
+    assert not list(tmp_path.glob("a.*"))
