@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from guarded import scene, simulation
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
-from test_guards import scene, simulation
 
 from skfsink.errors import SkfsinkError
 from skfsink.explicit import ExplicitControls

@@ -2,79 +2,27 @@
 
 from __future__ import annotations
 
-import dataclasses
 import logging
 import re
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import skfem
+from guarded import SHARP, Watched, scene
 
-from skfsink.density import DensitySolver
-from skfsink.energy import Ledger
-from skfsink.errors import ConvergenceError, InstabilityError, ParameterError
-from skfsink.explicit import Explicit, ExplicitControls
-from skfsink.guards import Guard, Notes
+from skfsink.errors import InstabilityError
+from skfsink.explicit import ExplicitControls
+from skfsink.guards import Notes
 from skfsink.hht import HHTControls
-from skfsink.material import AAA, SinkLaw
-from skfsink.momentum import Momentum
-from skfsink.progress import Display
-from skfsink.result import summarize
+from skfsink.material import AAA
 from skfsink.sample import Sample
-from skfsink.scene import Controls, Scene
-from skfsink.simulate import Simulation, onset_copy
+from skfsink.scene import Scene
 from skfsink.space import Space
-from skfsink.state import State
-from skfsink.statics import Statics, StaticsControls
 from skfsink.study.blocks import block
-from skfsink.study.body import PULLED, Body
 
 MU = AAA().shear_modulus
-PLAIN = block(15)      # h = l/1.5, without a notch: nothing to warn of
-NOTCHED = Body(block(15, notch=0.4, width=0.06))
-SHARP = r"a notch turns by 90 degrees"  # what a notch cut out of rows of elements always gives
-
-
-def scene(sample: Sample = PLAIN, material: AAA | None = None, law: SinkLaw | None = None, **controls: Any) -> Scene:
-    """A block between grips."""
-    return Scene("block", "Block", {}, sample, material or AAA(), law or SinkLaw(), PULLED,
-                 controls=Controls(**controls))
-
-
-class Watched:
-    """A guard with a state in order: intact, a little stretched, a closed ledger with an energy of 1 at the onset."""
-
-    def __init__(self, of: Scene | None = None, stretch: float = 0.01) -> None:
-        self.scene = of or scene()
-        space = self.scene.sample.space
-        self.momentum = Momentum(space, self.scene.material, self.scene.controls.element)
-        self.guard = Guard(self.scene, self.momentum)
-        self.guard.scale = 1.0
-        self.state = State.intact(space)
-        self.state.phase = "event"
-        self.state.u = space.X * (np.array([1 / (1 + stretch), 1 + stretch]) - 1)
-        self.state.ledger.initial = self.state.ledger.elastic = 1.0
-        self.update()
-
-    def update(self) -> None:
-        """Evaluate the force."""
-        self.momentum.set_gamma(self.state.gamma, self.state.deleted)
-        self.momentum.force(self.state.u)
-
-
-def simulation(of: Scene, folder: Path) -> Simulation:
-    """A run of a scene in a folder."""
-    folder.mkdir(exist_ok=True)
-    return Simulation(of, folder, Display(True))
-
-
-def event(folder: Path, **controls: Any) -> Simulation:
-    """A run of the notched block from its onset on, not yet started."""
-    controls = {"event_time": 1e-5, "overshoot": 0.01, "checkpoint_every": 1e6, **controls}
-    return simulation(dataclasses.replace(NOTCHED.scene, controls=Controls(**controls)), folder)
 
 
 # --- warnings ---
@@ -300,139 +248,3 @@ def test_cure_is_that_of_the_method(controls: dict[str, Any], cure: str):
     failed(30)(watched)
     with pytest.raises(InstabilityError, match=cure):
         watched.guard.check_step(watched.state)
-
-
-# --- whole runs ---
-def test_too_long_a_step_stops_the_run_with_the_cure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """Fails if a run whose step is too long goes on to NaN, or ends with an error that names no cure."""
-    step = Explicit._set_step
-
-    def longer(self: Explicit, state: State) -> None:
-        step(self, state)
-        self.dt *= 1.4 / 0.8
-    monkeypatch.setattr(Explicit, "_set_step", longer)
-    sim = event(tmp_path)
-    with np.errstate(all="ignore"), pytest.raises(InstabilityError, match=r"energy fed in .* lower --courant"):
-        sim.run(NOTCHED.onset)
-    assert np.isfinite(sim.state.u).all() and sim.state.gamma.min() > 0.0
-
-
-def test_run_keeps_its_warnings(tmp_path: Path):
-    """Fails if summary.json does not list what was warned of, or a resumed run forgets it."""
-    sim = event(tmp_path, sink="consistent")
-    sim.run(NOTCHED.onset)
-    expected = [SHARP, "the consistent sink varies by more than 1e3", r"falls to -0.\d+: the consistent sink"]
-    for texts in (summarize(sim.scene, sim)["warnings"],
-                  Simulation(sim.scene, tmp_path, Display(True), resume=True).notes.texts):
-        assert len(texts) == 3
-        for form in expected:
-            assert any(re.search(form, text) for text in texts), form
-
-
-def test_long_hht_steps_are_cut_and_said_so(tmp_path: Path):
-    """Fails if a step in which a crack runs through is taken, or cut without a word."""
-    sim = event(tmp_path, integrator="hht", hht=HHTControls(dt=1e-5), event_time=2e-5)
-    sim.run(NOTCHED.onset)
-    assert any("would let a crack run through at once" in text for text in sim.notes.texts)
-    assert sim.state.deleted.mean() < 0.15
-
-
-def test_unconverged_sweep_is_not_followed(monkeypatch: pytest.MonkeyPatch):
-    """Fails if the history follows a state that is no equilibrium: the sweep must end the run, and change nothing."""
-    state = NOTCHED.onset
-    state.u *= 1.01
-    state.grip *= 1.01
-    state.step = 0
-    before = onset_copy(state)
-    statics = NOTCHED.statics()
-    monkeypatch.setattr(statics, "SNAP", 1)
-    with pytest.raises(ConvergenceError, match=r"sweep 1: no equilibrium within 1 Newton steps; the history follows"):
-        next(statics.propagate(state))
-    for name in ("u", "gamma", "W_max", "deleted"):
-        np.testing.assert_array_equal(getattr(state, name), getattr(before, name))
-
-
-@pytest.mark.parametrize(("most", "refused", "early", "message"), [
-    (80, "runs away", 1e-3, ""),
-    (20, "passes", 1e-3, ""),
-    (5, "passes", 2e-2, r"the onset may be too low: .* after 5 passes .* raise max_passes"),
-])
-def test_onset_says_why_it_is_one(most: int, refused: str, early: float, message: str,
-                                  caplog: pytest.LogCaptureFixture):
-    """Fails if an iteration of the two fields that was cut short passes for the onset, or harmless ones are told."""
-    statics = Statics(NOTCHED.momentum, NOTCHED.density, *NOTCHED.constraints, StaticsControls(max_passes=most))
-    state = State.intact(NOTCHED.sample.space)
-    for _ in statics.load(state):
-        pass
-    assert statics.refused == refused and len(caplog.messages) == bool(message)
-    assert re.search(message, caplog.text)
-    missing = 1 - state.grip / NOTCHED.onset.grip
-    assert 0 <= missing < early and (missing > 5e-3) == bool(message)
-
-
-def test_onset_that_is_the_end_of_newton_is_said_so(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture):
-    """Fails if loading that ends because no equilibrium is found passes for the onset of failure."""
-    statics = NOTCHED.statics()
-    limit, newton = 0.5 * NOTCHED.onset.grip, statics.newton.equilibrium
-
-    def ends(u: np.ndarray, *args: Any) -> Any:
-        if np.abs(u).max() > 1e-3 * limit:
-            raise ConvergenceError("no equilibrium")
-        return newton(u, *args)
-    monkeypatch.setattr(statics.newton, "equilibrium", ends)
-    for _ in statics.load(State.intact(NOTCHED.sample.space)):
-        pass
-    assert "the onset is where Newton's method ends" in caplog.text
-
-
-def test_energy_in_deleted_elements_is_booked_as_such():
-    """Fails if it goes to the sink: with a high threshold and no force floor elements still bear force when deleted."""
-    body = Body(NOTCHED.sample, deletion=0.3, force_floor=0.0, overshoot=0.01)
-    state = body.onset
-    state.u *= 1.01
-    state.time, state.step, state.ledger = 0.0, 0, Ledger()
-    scheme = body.explicit(ExplicitControls())
-    scheme.begin(state)
-    booked = 0.0
-    for _ in scheme.run(state, 2e-5):
-        new = [e for t, e in state.deletions if t == state.time]
-        if state.ledger.deletion != booked:
-            assert new
-            left = body.sample.space.at_gauss(state.gamma)[new] * body.momentum.W[new] * body.sample.space.w[new]
-            assert state.ledger.deletion - booked == pytest.approx(float(left.sum()), rel=1e-9)
-            booked = state.ledger.deletion
-        assert abs(state.ledger.balance) < 1e-10 * state.ledger.initial
-    assert booked > 1e-3 * state.ledger.initial
-
-
-def test_nodes_without_mass_stay_where_they_are():
-    """Fails if a mass floor of zero divides by the mass of dead nodes, which bear no force either."""
-    state, X = NOTCHED.onset, NOTCHED.sample.space.X
-    state.gamma[np.linalg.norm(X - (0.7, 0.5), axis=1) < 0.2] = 1e-15
-    state.time, state.step, state.ledger = 0.0, 0, Ledger()
-    scheme = NOTCHED.explicit(ExplicitControls(mass_floor=0.0, gamma_every=10**6))
-    scheme.begin(state)
-    dead, u = np.argmin(np.linalg.norm(X - (0.7, 0.5), axis=1)), state.u.copy()
-    assert NOTCHED.momentum.lumped_mass(0.0)[dead] == 0.0
-    for _ in range(40):
-        scheme.step(state)
-    np.testing.assert_array_equal(state.u[dead], u[dead])
-    assert np.isfinite(state.u).all() and np.isfinite(state.ledger.kinetic) and state.ledger.kinetic > 0
-
-
-@pytest.mark.parametrize("sink", ["lumped", "consistent", "nearest"])
-@pytest.mark.parametrize("energy", [np.nan, np.inf])
-def test_energy_that_is_no_number_does_not_pass_into_the_density(sink: str, energy: float):
-    """Fails if a blow-up goes on as a gamma of NaN, or as a body without the points that blew up, or has no cure."""
-    W = np.full(PLAIN.space.w.shape, 0.01)
-    W[7, 2] = energy
-    solver = DensitySolver(PLAIN.space, SinkLaw(), sink)
-    with pytest.raises(ConvergenceError, match=r"is not finite: lower --courant or --hht-dt"):
-        solver.solve(W, np.ones(PLAIN.space.n_nodes))
-
-
-@pytest.mark.parametrize("alpha", [-0.334, 0.001])
-def test_alpha_outside_its_range_is_refused(alpha: float):
-    """Fails if an alpha is taken with which the scheme is unstable, or dissipates low modes."""
-    with pytest.raises(ParameterError, match=r"hht-alpha must be a finite number in \[-0.333333, 0\]"):
-        HHTControls(alpha=alpha)

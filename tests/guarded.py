@@ -1,0 +1,63 @@
+"""Bodies and runs for the tests of the guards."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from skfsink.guards import Guard
+from skfsink.material import AAA, SinkLaw
+from skfsink.momentum import Momentum
+from skfsink.progress import Display
+from skfsink.sample import Sample
+from skfsink.scene import Controls, Scene
+from skfsink.simulate import Simulation
+from skfsink.state import State
+from skfsink.study.blocks import block
+from skfsink.study.body import PULLED, Body
+
+PLAIN = block(15)      # h = l/1.5, without a notch: nothing to warn of
+NOTCHED = Body(block(15, notch=0.4, width=0.06))
+SHARP = r"a notch turns by 90 degrees"  # what a notch cut out of rows of elements always gives
+
+
+def scene(sample: Sample = PLAIN, material: AAA | None = None, law: SinkLaw | None = None, **controls: Any) -> Scene:
+    """A block between grips."""
+    return Scene("block", "Block", {}, sample, material or AAA(), law or SinkLaw(), PULLED,
+                 controls=Controls(**controls))
+
+
+class Watched:
+    """A guard with a state in order: intact, a little stretched, a closed ledger with an energy of 1 at the onset."""
+
+    def __init__(self, of: Scene | None = None, stretch: float = 0.01) -> None:
+        self.scene = of or scene()
+        space = self.scene.sample.space
+        self.momentum = Momentum(space, self.scene.material, self.scene.controls.element)
+        self.guard = Guard(self.scene, self.momentum)
+        self.guard.scale = 1.0
+        self.state = State.intact(space)
+        self.state.phase = "event"
+        self.state.u = space.X * (np.array([1 / (1 + stretch), 1 + stretch]) - 1)
+        self.state.ledger.initial = self.state.ledger.elastic = 1.0
+        self.update()
+
+    def update(self) -> None:
+        """Evaluate the force."""
+        self.momentum.set_gamma(self.state.gamma, self.state.deleted)
+        self.momentum.force(self.state.u)
+
+
+def simulation(of: Scene, folder: Path) -> Simulation:
+    """A run of a scene in a folder."""
+    folder.mkdir(exist_ok=True)
+    return Simulation(of, folder, Display(True))
+
+
+def event(folder: Path, **controls: Any) -> Simulation:
+    """A run of the notched block from its onset on, not yet started."""
+    controls = {"event_time": 1e-5, "overshoot": 0.01, "checkpoint_every": 1e6, **controls}
+    return simulation(dataclasses.replace(NOTCHED.scene, controls=Controls(**controls)), folder)
