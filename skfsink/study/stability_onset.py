@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,7 @@ __all__ = ["draw_length", "draw_notch", "draw_staggering", "draw_sweeps", "lengt
            "plan_notch", "plan_staggering", "plan_sweeps", "staggering", "sweeps"]
 
 
+@cache
 def _plate() -> Body:
     return Body(block(15, notch=0.4, width=0.06))
 
