@@ -24,10 +24,10 @@ from skfsink import citation
 from skfsink.cli import command
 from skfsink.commands.report import report
 from skfsink.errors import OutputError
-from skfsink.history import History
+from skfsink.history import HISTORY_COLUMNS, History
 from skfsink.loader import ENERGIES, FIELD_UNITS
 from skfsink.meshing import write_mesh
-from skfsink.report import report_page, write_report
+from skfsink.report import charts, report_page, write_report
 from skfsink.report.scenes import command_line, run_labels
 from skfsink.sample import data_folder
 
@@ -258,6 +258,38 @@ def test_runs_compared(folder: Path, copy: Path) -> None:
     assert re.findall(r'<th scope="row">(\w+)</th><td>([^<]*)</td><td>([^<]*)', differ) == [("courant", "0.8", "0.5")]
 
 
+def test_curves_of_all_runs_are_whole(folder: Path, copy: Path) -> None:
+    """Fails if a curve leaves its picture, as one that goes beyond the first run's if the axes were set too early."""
+    history = History(copy / "history.csv", [
+        {**row, "U_paper": 5 * row["U_paper"], "crack_length_mm": 2 * row["crack_length_mm"]}
+        for values in zip(*History.load(copy / "history.csv").values())
+        for row in [dict(zip(HISTORY_COLUMNS, values))]])
+    figures = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(charts, "_svg", lambda figure: figures.append(figure) or b"")
+        runs, labels = [skfsink.load(folder / "dynamic"), skfsink.load(copy)], ["a", "b"]
+        assert charts.energy_chart(runs, labels) and charts.loading_chart(runs, labels)
+        assert charts.speed_chart(runs, labels, [(29.0, 28.0), (29.0, 28.0)])
+    assert len(history.rows) > 10 and len(figures) == 3
+    for ax in (ax for figure in figures for ax in figure.axes):
+        for line in ax.lines:
+            x, y = line.get_data()
+            if len(x) > 2:
+                assert x.max() <= ax.get_xlim()[1] and np.nanmax(y) <= ax.get_ylim()[1], ax.get_ylabel()
+
+
+def test_half_of_a_body_says_so(copy: Path) -> None:
+    """Fails if figures of a part are shown without those of the whole."""
+    summary = json.loads((copy / "summary.json").read_text())
+    summary["whole"] = {"energy": 2.0, "load": 2.0, "displacement": 1.0}
+    summary["quantities"]["U"] = 2 * summary["quantities"]["U"]
+    (copy / "summary.json").write_text(json.dumps(summary))
+    text = report_page([skfsink.load(copy)])
+    checked(text)
+    assert "of the whole: energy × 2, load × 2, displacement × 1" in text
+    assert f"<td>{summary['quantities']['U']:.4g}</td>" in text.split("of the whole sample: U at the first arrival")[1]
+
+
 def test_plates_beside_bodies_in_space_keep_their_units() -> None:
     """Fails if energies in N mm/mm and in N mm stand in one column without saying which is which."""
     folders = [data_folder(case) / "reference" / key for case, key in (
@@ -350,7 +382,7 @@ def test_a_browser_shows_the_report(folder: Path, browser: Any, tmp_path: Path, 
     found = seen(browser, path, width)
     assert found["said"] == [path.absolute().as_uri()]
     assert found["title"].startswith("Single edge notch, mesh plate, dynamic and quasi-static")
-    assert found["images"] == 13 and found["tables"] == 5
+    assert found["images"] == 13 and found["tables"] == 6
     assert (found["broken"], found["hidden"], found["dead"], found["wide"]) == (0, 0, 0, 0)
     assert found["font"] == "700"  # the style is let in by the page's own policy
 

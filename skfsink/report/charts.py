@@ -91,10 +91,12 @@ def energy_chart(runs: Sequence[Run], labels: Sequence[str]) -> Chart | None:
         unit = event.units["U_paper"]
         for ax, name, values in zip(axes, "UD", parts):
             ax.plot(length, values, **look)
-            ax.set(title=f"${name}$", xlabel="length of the crack (mm)", ylim=(0, None), xlim=(0, None))
+            ax.set(title=f"${name}$", xlabel="length of the crack (mm)")
         said.append(f"{label}: U {parts[0][-1]:.3g}, D {parts[1][-1]:.3g} {unit} at the end")
     if not said:
         return None
+    for ax in axes:  # not before all lines are drawn, which would leave out what goes beyond the first
+        ax.set(xlim=(0, None), ylim=(0, None))
     axes[0].set_ylabel(f"energy ({_unit(runs, 'U_paper')})")
     if len(runs) > 1:
         figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper left", ncols=3)

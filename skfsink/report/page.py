@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +18,7 @@ from ..files import reported, write_atomic
 from ..loader import Run, load
 from . import charts
 from .scenes import command_line, differences, parameter_table, run_labels
-from .tables import EMPTY, Row, Table, cost_table, energy_table, key_table, version_table
+from .tables import EMPTY, Row, Table, cost_table, energy_tables, key_table, version_table
 
 __all__ = ["report_page", "write_report"]
 
@@ -49,6 +50,7 @@ class Part:
 
     label: str
     what: str
+    note: str
     pictures: dict[str, Picture]
     warnings: tuple[str, ...]
     assumed: tuple[str, ...]
@@ -106,7 +108,7 @@ def report_page(asked: Sequence[Run]) -> str:
         title=_title(asked), several=several, labels=labels, keys=keys,
         cards=[] if several else [row for row in keys.rows if row.name in _CARDS],
         charts={title: Picture(_data(chart.svg, ".svg"), title, chart.alt) for title, chart in drawn},
-        comparisons=[picture for picture in comparisons if picture], energies=energy_table(runs, labels),
+        comparisons=[picture for picture in comparisons if picture], energies=energy_tables(runs, labels),
         parts=parts, titles={title for part in parts for title in part.pictures},
         differences=differences(runs, labels) if several else None,
         same_assumed=len({run.assumed for run in runs}) == 1, cost=cost_table(runs, labels),
@@ -133,8 +135,8 @@ def _part(run: Run, label: str, several: bool) -> Part:
     choice = run.summary.get("model") or run.choice
     rows = tuple(Row(name.replace("_", " "), "", (_flat(value),)) for name, value in choice.items() if name != "text")
     return Part(label, f"{run.case.replace('_', ' ')}, mesh {run.parameters.get('mesh', EMPTY)}, {_kind(run)}",
-                {title: picture for title, picture in pictures.items() if picture}, tuple(run.warnings), run.assumed,
-                rows, str(choice.get("text", "")), parameter_table(run), command_line(run), run.finished)
+                _note(run), {title: picture for title, picture in pictures.items() if picture}, tuple(run.warnings),
+                run.assumed, rows, str(choice.get("text", "")), parameter_table(run), command_line(run), run.finished)
 
 
 def _flat(value: object) -> str:
@@ -168,8 +170,14 @@ def _data(content: bytes, suffix: str) -> str:
 
 
 def _symbols(text: str) -> Markup:
-    """Wave speeds with their index below the line."""
-    escaped = str(Markup.escape(text))
-    for index in "sR":
-        escaped = escaped.replace(f"c_{index}", f"<i>c</i><sub>{index}</sub>")
-    return Markup(escaped)
+    """Symbols with their index below the line: c_R, c_s, ψ_f."""
+    return Markup(re.sub(r"\b([cψ])_([fRs])\b", r"<i>\1</i><sub>\2</sub>", str(Markup.escape(text))))
+
+
+def _note(run: Run) -> str:
+    """What is to be said of a run that computed a part of the sample only."""
+    whole = run.summary.get("whole") or {}
+    if all(factor == 1.0 for factor in whole.values()):
+        return ""
+    return ("computed was a part of the sample, and energies, loads and curves are those of the part; of the whole: "
+            + ", ".join(f"{name} × {factor:g}" for name, factor in whole.items()))

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..loader import ENERGIES, Run
 
-__all__ = ["Row", "Table", "cost_table", "energy_table", "key_table", "number", "version_table"]
+__all__ = ["Row", "Table", "cost_table", "energy_tables", "key_table", "number", "version_table"]
 
 EMPTY = "–"
 
@@ -126,18 +126,19 @@ def key_table(runs: Sequence[Run], labels: Sequence[str], waves: Sequence[tuple[
     return _table("Key figures", labels, rows)
 
 
-def energy_table(runs: Sequence[Run], labels: Sequence[str]) -> Table:
-    """Where the energy of the event is at its start, at the first arrival and at the end, three columns a run."""
-    tables = [run.energies for run in runs]
-    rows = []
-    for name, _, meaning in ENERGIES:
-        energies = [table.get(name) for table in tables]
-        values = [value for e in energies for value in ((e.start, e.arrival, e.end) if e else (None,) * 3)]
-        units = [u for run in runs for u in [run.history.units["elastic"]] * 3]
-        rows.append(_row(meaning, units, values))
-    columns = [f"{label}, {moment}" if len(runs) > 1 else moment for label in labels
-               for moment in ("start", "first arrival", "end")]
-    return _table("Energies of the event", columns, rows)
+def energy_tables(runs: Sequence[Run], labels: Sequence[str]) -> list[Table]:
+    """Where the energy of the event is: of one run at its start, at the first arrival and at the end; of several a
+    table of each of the latter two."""
+    moments = {"start": "at the start", "arrival": "at the first arrival", "end": "at the end"}
+
+    def rows(*keys: str) -> list[Row]:
+        units = [run.history.units["elastic"] for run in runs for _ in keys]
+        return [_row(meaning, units, [getattr(run.energies[name], key) for run in runs for key in keys])
+                for name, _, meaning in ENERGIES]
+
+    if len(runs) == 1:
+        return [_table("Energies of the event", tuple(moments.values()), rows(*moments))]
+    return [_table(f"Energies {moments[key]}", labels, rows(key)) for key in ("arrival", "end")]
 
 
 def cost_table(runs: Sequence[Run], labels: Sequence[str]) -> Table:
