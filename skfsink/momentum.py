@@ -37,6 +37,7 @@ class Momentum:
     energy: gamma-weighted stored energy at the last evaluation [N mm; N mm/mm in 2D].
     least_J: least J (plane stress: its part in the plane) at a Gauss point with gamma > 0 at the last evaluation.
     evaluations: how often the force was evaluated.
+    fibres: directions in each element (ne, families, 3), for laws of several invariants, else None.
     """
 
     def __init__(self, space: Space, material: Material, element: str = "jbar", force_floor: float = 1e-3,
@@ -47,13 +48,13 @@ class Momentum:
         self.space, self.material, self.force_floor = space, material, force_floor
         self.j_bar = element == "jbar"
         self.plane_stress = element == "planestress"
-        self._fibres: np.ndarray | None = None  # directions, for laws of several invariants
+        self.fibres: np.ndarray | None = None
         if isinstance(material, GeneralMaterial):
             if self.plane_stress:
                 raise ParameterError("element planestress is for laws of I1' alone; "
                                      f"{type(material).__name__} has more invariants: take jbar")
-            self._fibres = material.fibres(space.X[space.conn].mean(axis=1))
-        self.tiles = kernels.Tiles(space, self.plane_stress, threads, self._fibres)
+            self.fibres = material.fibres(space.X[space.conn].mean(axis=1))
+        self.tiles = kernels.Tiles(space, self.plane_stress, threads, self.fibres)
         self.energy = 0.0
         self.least_J = 1.0
         self.evaluations = 0
@@ -107,8 +108,8 @@ class Momentum:
         """Data of the tangent stiffness at `u` on `pattern`; with `convex` one that is positive at every point."""
         if self.plane_stress:
             return kernels.tangent_plane_stress(self.space, pattern, self.material, u, self.gamma, convex)
-        if isinstance(self.material, GeneralMaterial) and self._fibres is not None:
-            return kernels.tangent_general(self.space, pattern, self.material, u, self.gamma, self._fibres, self.j_bar,
+        if isinstance(self.material, GeneralMaterial) and self.fibres is not None:
+            return kernels.tangent_general(self.space, pattern, self.material, u, self.gamma, self.fibres, self.j_bar,
                                            convex)
         return kernels.tangent(self.space, pattern, self.material, u, self.gamma, self.j_bar, convex)
 

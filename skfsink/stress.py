@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .kernels.lanes import J_FLOOR
+from .material import GeneralMaterial
 from .momentum import Momentum
 
 __all__ = ["cauchy_stress", "pressure", "von_mises"]
@@ -42,6 +43,10 @@ def _at_points(momentum: Momentum, u: np.ndarray, part: slice, gamma: np.ndarray
     if momentum.j_bar:
         w = space.w[part]
         J_bar, gamma_bar = ((w * a).sum(axis=1, keepdims=True) / w.sum(axis=1, keepdims=True) for a in (raw, gamma))
+    if isinstance(material, GeneralMaterial) and momentum.fibres is not None:
+        tau = material.isochoric_stress(F, fibres=momentum.fibres[part][:, None]) @ np.swapaxes(F, -1, -2)
+        return np.asarray((gamma / J)[..., None] * tau[..., _VOIGT[0], _VOIGT[1]]
+                          + (gamma_bar * k * (J_bar - 1))[..., None] * np.array([1.0, 1, 1, 0, 0, 0]))
     b = np.einsum("eqiJ,eqjJ->eqij", F, F)
     trace = np.trace(b, axis1=-2, axis2=-1)
     _, slope, _ = material.isochoric(J ** (-2 / 3) * trace)
