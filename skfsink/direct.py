@@ -7,23 +7,31 @@ from __future__ import annotations
 
 import ctypes
 import os
+from contextlib import AbstractContextManager
+from typing import Any
 
 import numpy as np
 import scipy.sparse.linalg as sla
 from numba import njit
 from scipy.sparse import csc_array, csr_array
+from threadpoolctl import ThreadpoolController
 
 from .errors import ConvergenceError
 from .pattern import Pattern
 
 os.environ.setdefault("MKL_CBWR", "AUTO,STRICT")  # the same bits from one run to the next, whatever the alignment
 
-__all__ = ["Factorization", "symmetric_product", "unsigned"]
+__all__ = ["Factorization", "one_thread_of_openblas", "symmetric_product", "unsigned"]
 
 try:
     import pypardiso
 except ImportError:  # not x86-64: SuperLU does it, several times slower
     pypardiso = None
+
+
+def one_thread_of_openblas() -> AbstractContextManager[Any]:
+    """Keeps NumPy's and SciPy's sums of short vectors to one thread, which is faster; PARDISO has its own."""
+    return ThreadpoolController().select(internal_api="openblas").limit(limits=1)
 
 
 class Factorization:

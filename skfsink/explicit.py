@@ -146,7 +146,7 @@ class Explicit:
         state.ledger.initial += state.ledger.kinetic
 
     def _kinetic(self, state: State) -> float:
-        return 0.5 * float(self.mass @ np.einsum("ai,ai->a", state.v, state.v))
+        return float(self.mass @ _half_square(state.v))
 
     # --- the step ---
     def run(self, state: State, t_end: float) -> Iterator[State]:
@@ -200,10 +200,11 @@ class Explicit:
         mass, self.mass = self.mass, momentum.lumped_mass(self._mass_floor)
         ledger.sink_stored += stored - left
         ledger.deletion += left
-        ledger.sink_kinetic += 0.5 * float((mass - self.mass) @ np.einsum("ai,ai->a", state.v, state.v))
+        half_v2 = _half_square(state.v)
+        ledger.sink_kinetic += float((mass - self.mass) @ half_v2)
         self._elastic -= stored
         ledger.elastic = self._elastic
-        ledger.kinetic = self._kinetic(state)
+        ledger.kinetic = float(self.mass @ half_v2)
 
     def sync(self, state: State) -> None:
         """Bring `state.W_max` up to date; between density solves the integrator keeps it tiled."""
@@ -260,6 +261,12 @@ class Explicit:
         self._last_estimate, self.estimates = int(scalars[3]), int(scalars[4])
         self._urgent, self._since_gamma = bool(scalars[6]), int(scalars[7])
         self.reaction = memory["reaction"]
+
+
+def _half_square(v: np.ndarray) -> np.ndarray:
+    """|v|^2/2 of each row."""
+    half: np.ndarray = (v * v) @ np.full(v.shape[1], 0.5)  # several times as fast as einsum on rows of two
+    return half
 
 
 @njit(cache=True)

@@ -11,6 +11,7 @@ import math
 import platform
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -48,6 +49,8 @@ class Series:
     def __init__(self, folder: str | Path, name: str, space: Space) -> None:
         self.folder, self.name, self.space = Path(folder), name, space
         self.times: list[float] = []
+        self._writer = ThreadPoolExecutor(1, "frames")  # compressing a frame takes as long as twenty steps
+        self._pending: Future[None] | None = None
         self._points = _vectors(space.X)
         self._cells = [("quad" if space.dim == 2 else "hexahedron", space.conn[:, VTK_ORDER[space.dim]].astype("i4"))]
 
@@ -61,16 +64,33 @@ class Series:
         return self.folder / f"{self.name}_{number:04d}.vtu"
 
     def add(self, time: float, point_data: Mapping[str, np.ndarray], cell_data: Mapping[str, np.ndarray]) -> None:
-        """Write a frame, then name it in the PVD file.
+        """Write a frame, then name it in the PVD file, while the caller goes on; see :meth:`flush`.
 
         Arrays are (n,) or (n, dim) on points, (ne,) or (ne, dim) on cells. Vectors get a third component; floats are
         stored in single precision, flags as bytes.
         """
+        self.flush()
         points = {name: _field(values) for name, values in point_data.items()}
         cells = {name: [_field(values)] for name, values in cell_data.items()}
-        with replaced(self.frame(len(self.times))) as part:
-            meshio.write(part, meshio.Mesh(self._points, self._cells, points, cells), "vtu", compression="zlib")
+        mesh = meshio.Mesh(self._points, self._cells, points, cells)
         self.times.append(float(time))
+        self._pending = self._writer.submit(self._write, self.frame(len(self.times) - 1), mesh)
+
+    def flush(self) -> None:
+        """Wait until every frame is written.
+
+        Raises
+        ------
+        OutputError
+            One could not be written.
+        """
+        if self._pending is not None:
+            pending, self._pending = self._pending, None
+            pending.result()
+
+    def _write(self, path: Path, mesh: meshio.Mesh) -> None:
+        with replaced(path) as part:
+            meshio.write(part, mesh, "vtu", compression="zlib")
         self._write_index()
 
     def resume(self, n: int) -> None:
@@ -81,6 +101,7 @@ class Series:
         OutputError
             There is no such series, or it has fewer frames.
         """
+        self.flush()
         failure = f"cannot resume the series of fields: {self.path}"
         try:
             times = [float(entry.attrib["timestep"]) for entry in ET.parse(self.path).iter("DataSet")] if n else []
@@ -112,11 +133,14 @@ def frame_times(path: Path) -> list[float]:
 
 
 def _field(values: np.ndarray) -> np.ndarray:
+    """A copy as it is stored."""
     if values.dtype == bool:
         values = values.astype(np.uint8)
     elif values.dtype.kind == "f":
         limit = np.finfo(np.float32).max
         values = np.clip(values, -limit, limit).astype(np.float32)
+    else:
+        values = values.copy()
     return _vectors(values) if values.ndim == 2 and values.shape[1] == 2 else values
 
 

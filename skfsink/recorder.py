@@ -110,6 +110,7 @@ class Recorder:
         """Last row and frame, and the log of deleted elements."""
         self._record(state, reaction, dt)
         self.frame(state, "end")
+        self.series.flush()
         log = "".join(f"{time!r},{element}\n" for time, element in state.deletions)
         write_atomic(self.history.path.with_name("deletions.csv"), "time_s,element\n" + log)
 
@@ -153,5 +154,6 @@ class Recorder:
     # --- checkpoints ---
     def memory(self) -> dict[str, Any]:
         """What goes into a checkpoint as JSON; the tracker's arrays go beside it."""
+        self.series.flush()  # a checkpoint names its frames
         return {"rows": self.history.rows, "frames": self.frames, "moments": self.moments, "onset": self.onset,
                 "at_arrival": self.at_arrival, "separated_at": self.separated_at}

@@ -11,6 +11,7 @@ import numpy as np
 
 from .checkpoint import load_checkpoint, save_checkpoint, save_state
 from .density import DensitySolver
+from .direct import one_thread_of_openblas
 from .energy import Ledger
 from .errors import CheckpointError, SkfsinkError
 from .explicit import Explicit
@@ -79,7 +80,7 @@ class Simulation:
     # --- the phases ---
     def run(self, onset: State | None = None) -> State:
         """Run to the end from where the state is; `onset` is a state already loaded to the onset."""
-        with Interrupt() as interrupt, self.notes:
+        with Interrupt() as interrupt, self.notes, one_thread_of_openblas():
             self._interrupt = interrupt
             if self.state.phase == "loading":
                 self.recorder.guard.check_scene()

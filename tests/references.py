@@ -68,6 +68,7 @@ def write_run(folder: Path, scene: Scene) -> Path:
                    {"deleted": frame.deleted.astype(np.int8)})
         history.append({"phase": "event", "step": i, "time_s": 0.0 if quasistatic else i * STEP, "elastic": 0.05,
                         "crack_length_mm": 3 * tip, "U_paper": 0.06 * tip})
+    series.flush()
     share = 0.6 if quasistatic else 1.0
     write_summary(folder / "summary.json", {
         "schema": 1, "case": scene.case, "mesh": scene.sample.name, "analysis": scene.controls.analysis,

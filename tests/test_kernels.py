@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numba
 import numpy as np
 import pytest
 import skfem
@@ -329,3 +330,19 @@ def test_unused_nodes_triangles_and_nan_are_refused(kind: str):
         Space(skfem.MeshTri())
     with pytest.raises(ParameterError, match="element must be one of jbar, plain, planestress; got 'q2'"):
         Momentum(Space(mesh), AAA(), "q2")
+
+
+def test_threads_do_not_change_a_bit(kind: str, monkeypatch: pytest.MonkeyPatch):
+    """Fails if the shares of two threads overlap, leave a tile out, or their least J is not the least of both."""
+    monkeypatch.setattr(kernels.Tiles, "WORTH", 0)
+    space = box(kind, 24 if kind == "quad" else 5)  # eight or nine tiles
+    u = 0.1 * np.sin(7 * space.X)
+    one, two = (Momentum(space, AAA(), threads=threads) for threads in (1, 2))
+    np.testing.assert_array_equal(one.force(u), two.force(u))
+    assert (one.energy, one.least_J) == (two.energy, two.least_J)
+    ones = np.ones_like(space.X)
+    assert one.stiffest(u, ones) == two.stiffest(u, ones)
+    body = kernels.Tiles(space, threads=2)
+    assert body.threads == min(2, numba.config.NUMBA_NUM_THREADS)
+    monkeypatch.undo()
+    assert kernels.Tiles(space, threads=2).threads == 1  # too small to be shared

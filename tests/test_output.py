@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import shutil
 import signal
 import tempfile
 import xml.etree.ElementTree as ET
@@ -173,6 +174,7 @@ def test_cells_have_their_volume_and_fields_their_values(tmp_path: Path, kind: s
     series = Series(tmp_path, "run", space)
     points, cells = fields(space, 0)
     series.add(0.0, points, cells | {"huge": np.full(space.n_elements, 1e60)})
+    series.flush()
     mesh = meshio.read(series.frame(0))
     assert [block.type for block in mesh.cells] == ["quad" if kind == "quad" else "hexahedron"]
     corners = mesh.points[mesh.cells[0].data]
@@ -195,6 +197,7 @@ def test_paraview_s_library_opens_the_series(tmp_path: Path, kind: str) -> None:
     times = [0.0, 1e-6 / 3, 0.1 + 0.2]
     for i, time in enumerate(times):
         series.add(time, *fields(space, i))
+    series.flush()
     reader = pyvista.get_reader(series.path)
     assert list(reader.time_values) == times
     reader.set_active_time_point(2)
@@ -202,6 +205,23 @@ def test_paraview_s_library_opens_the_series(tmp_path: Path, kind: str) -> None:
     sizes = data.compute_cell_sizes()["Volume" if kind == "hex" else "Area"]
     np.testing.assert_allclose(sizes, space.V, rtol=1e-6)
     np.testing.assert_array_equal(data["gamma"], fields(space, 2)[0]["gamma"].astype(np.float32))
+
+
+def test_a_frame_that_cannot_be_written_is_reported_and_later_changes_do_not_reach_it(tmp_path: Path) -> None:
+    """Fails if the error of the thread that writes is lost, or if it is given the caller's arrays instead of copies."""
+    space = sheared("quad", mirrored=False)
+    (tmp_path / "series").mkdir()
+    series = Series(tmp_path / "series", "run", space)
+    gamma, flags = np.ones(space.n_nodes), np.zeros(space.n_elements, np.int8)
+    series.add(0.0, {"gamma": gamma}, {"deleted": flags})
+    gamma[:], flags[:] = 0.0, 1
+    series.flush()
+    mesh = meshio.read(series.frame(0))
+    assert (mesh.point_data["gamma"] == 1).all() and not mesh.cell_data["deleted"][0].any()
+    shutil.rmtree(tmp_path / "series")
+    series.add(1.0, {"gamma": gamma}, {})
+    with pytest.raises(OutputError):
+        series.flush()
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="kills a fork of this process")
@@ -213,6 +233,7 @@ def test_killed_midway_the_series_names_no_missing_file_and_goes_on(tmp_path: Pa
     whole = Series(tmp_path, "whole", space)
     for i in range(4):
         whole.add(0.1 * i, *fields(space, i))
+    whole.flush()
     child = os.fork()
     if child == 0:  # dies just before or just after a file is put in its place: frame, index, frame, ...
         replace, count = os.replace, iter(range(1, 10))
@@ -238,6 +259,7 @@ def test_killed_midway_the_series_names_no_missing_file_and_goes_on(tmp_path: Pa
     series.resume(len(frames))
     for i in range(len(frames), 4):
         series.add(0.1 * i, *fields(space, i))
+    series.flush()
     assert [p.read_bytes() for p in named(series)] == [p.read_bytes() for p in named(whole)]
 
 
@@ -246,6 +268,7 @@ def test_resuming_drops_later_frames_and_only_those(tmp_path: Path) -> None:
     series = Series(tmp_path, "run", space)
     for i in range(5):
         series.add(i, *fields(space, i))
+    series.flush()
     foreign = tmp_path / "running_0004.vtu"
     foreign.write_text("")
     again = Series(tmp_path, "run", space)

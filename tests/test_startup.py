@@ -18,6 +18,7 @@ from skfsink.pattern import Pattern
 from skfsink.space import Space
 space = Space(skfem.MeshQuad.init_tensor(*2 * [np.linspace(0, 1, 3)]))
 for threads in (1, 2):
+    skfsink.kernels.Tiles.WORTH = 0
     momentum = Momentum(space, AAA(), threads=threads)
     momentum.force(np.zeros_like(space.X))
     momentum.stiffest(np.zeros_like(space.X), np.ones_like(space.X))

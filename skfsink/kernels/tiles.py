@@ -18,6 +18,7 @@ from numba import njit
 
 from ..material import CompiledLaw
 from ..space import Space
+from .faster import Faster
 from .lanes import LANES, LANES_3D
 from .plane_stress import stiffness_plane_stress
 from .relax import relax
@@ -38,9 +39,11 @@ class Tiles:
 
     With `fibres` (ne, families, 3), directions, `law` is one of several invariants, in plane strain or space.
 
-    The loops over tiles are shared by `threads` threads, those of the machine at the most; results do not depend on
-    their number.
+    The loops over tiles are shared by `threads` threads, those of the machine at the most, where that is faster (see
+    :class:`.Faster`) and the body has `WORTH` Gauss points; results do not depend on it.
     """
+
+    WORTH = 20_000
 
     def __init__(self, space: Space, plane_stress: bool = False, threads: int = 1,
                  fibres: np.ndarray | None = None) -> None:
@@ -57,7 +60,9 @@ class Tiles:
         self._force = np.zeros((self.count, na * dim, self.lanes))
         self._kernels = FORCES[0 if plane_stress else dim] if fibres is None else GENERAL_FORCES[dim]
         self._fibres = () if fibres is None else (self.tile(fibres.reshape(ne, -1)),)
-        self.threads = min(threads, numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
+        most: int = numba.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]
+        self.threads = 1 if space.w.size < self.WORTH else min(threads, most)
+        self._faster: dict[object, Faster] = {}
         start, entry = space.incidence
         element, local = np.divmod(entry, na)
         tile, lane = np.divmod(element, self.lanes)
@@ -102,13 +107,17 @@ class Tiles:
         return least
 
     def _share(self, loops: tuple[Callable[..., float], Callable[..., None]], *arguments: object) -> list[float]:
-        """What the threads' shares of a loop return."""
+        """What the shares of a loop return, from one thread or several, whichever was faster when last compared."""
         single, shared = loops
         if self.threads == 1:
             return [float(single(*arguments))]
         numba.set_num_threads(self.threads)
         results = np.empty(self.threads)
-        shared(*arguments, results)
+        choice = self._faster.setdefault(single, Faster())
+        with choice as several:
+            if not several:
+                return [float(single(*arguments))]
+            shared(*arguments, results)
         return [float(result) for result in results]
 
     def volumetric(self, x: np.ndarray, inverse_mass: np.ndarray) -> float:
