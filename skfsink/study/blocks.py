@@ -13,7 +13,8 @@ __all__ = ["block", "surface", "trapezium"]
 
 def block(n: int, *, notch: float = 0.0, width: float = 0.0, rounded: bool = False, distortion: float = 0.0,
           seed: int = 0) -> Sample:
-    """Square of 1 mm of n x n elements with the boundaries `top`, `bottom` and, if it has one, `notch`.
+    """Square of 1 mm of n x n elements with the boundaries `top`, `bottom`, `pin` (a node at
+    the middle of the right side) and, if it has one, `notch`.
 
     The notch enters at mid-height from the left, is `notch` [mm] long and `width` [mm] wide, cut out of rows of
     elements; 0 is a slit between two of them (n even). Its end is square, or a half circle if `rounded`. `distortion`
@@ -51,6 +52,7 @@ def block(n: int, *, notch: float = 0.0, width: float = 0.0, rounded: bool = Fal
     inner = np.setdiff1d(np.arange(used.size), skfem.MeshQuad(p, t).boundary_nodes())
     p[:, inner] += np.random.default_rng(seed).uniform(-distortion, distortion, (2, inner.size)) / n
     sets = {"top": np.flatnonzero(np.isclose(p[1], 1.0)), "bottom": np.flatnonzero(np.isclose(p[1], 0.0))}
+    sets["pin"] = np.array([np.argmin(np.hypot(p[0] - 1, p[1] - 0.5))])
     if notch > 0:
         sets["notch"] = np.flatnonzero(tip[used])
     return Sample(f"block{n}", Space(skfem.MeshQuad(p, t)), sets)

@@ -193,7 +193,7 @@ def draw_flat(axes: Sequence[Axes], points: Points) -> None:
     axes[1].axhline(1, color="0.6", linewidth=0.6, linestyle=":")
     axes[1].set(yscale="log", xlabel="height of the pressed block / its own", ylabel=r"greatest $W/\Phi$",
                 title="the sink takes them before that")
-    axes[0].legend(loc="lower right", fontsize=6)
+    axes[0].legend(loc=(0.02, 0.14), fontsize=6)
 
 
 # --- the consistent sink ---

@@ -13,10 +13,11 @@ from ..deletion import delete_failed
 from ..density import DensitySolver
 from ..energy import Ledger
 from ..plot import BLUE, RED, SAND
+from ..scene import Grip
 from ..state import State
 from ..statics import Statics, StaticsControls
 from .blocks import block
-from .body import Body
+from .body import SPEED, Body
 from .part import Planned, Points
 
 __all__ = ["draw_length", "draw_notch", "draw_staggering", "draw_sweeps", "length", "notch", "passes", "plan_length",
@@ -72,7 +73,7 @@ def draw_staggering(axes: Sequence[Axes], points: Points) -> None:
     axes[0].legend(loc="lower right")
     mine = [p for p in points.values() if "passes" in p]
     right = mine[-1]["opening"]
-    for reason, colour, style, name in (("passes", RED, "s", "given up: warning"),
+    for reason, colour, style, name in (("passes", RED, "s", "given up after these"),
                                         ("runs away", BLUE, "o", "runs away")):
         some = [p for p in mine if p["refused"] == reason]
         axes[1].plot([p["passes"] for p in some], [p["opening"] / right for p in some], style, color=colour,
@@ -138,10 +139,19 @@ def draw_sweeps(axes: Sequence[Axes], points: Points) -> None:
 
 
 # --- the notch and the length scale ---
+#: ends that slide sideways: the corners of a block whose ends are held fail before a blunt notch where h is small
+ROLLERS = (Grip("top", (None, SPEED)), Grip("bottom", (None, -SPEED)), Grip("pin", (0.0, None)))
+
+
 def notch(n: int, width: float) -> dict[str, Any]:
-    """Opening and force at the onset of a block of n x n elements with a notch of 0.4 mm of this width [mm]."""
-    body = Body(block(n, notch=0.4, width=width, rounded=width > 0))
-    return {"n": n, "width": width, "h": 1 / n, **body.onset_figures}
+    """Opening and force at the onset of a block of n x n elements with a notch of 0.4 mm of this width [mm].
+
+    `tip_mm` is how far from the end of the notch gamma is least.
+    """
+    body = Body(block(n, notch=0.4, width=width, rounded=width > 0), ROLLERS)
+    X, weakest = body.sample.space.X, np.argmin(body.onset.gamma)
+    return {"n": n, "width": width, "h": 1 / n, **body.onset_figures,
+            "tip_mm": float(np.linalg.norm(X[weakest] - (0.4, 0.5)))}
 
 
 def plan_notch(quick: bool) -> list[Planned]:
@@ -167,7 +177,7 @@ def length(per_length: float, n: int) -> dict[str, Any]:
 
     U and D, when less than a thousandth of the energy is left.
     """
-    body = Body(block(n, notch=0.2, width=0.2, rounded=True))
+    body = Body(block(n, notch=0.2, width=0.2, rounded=True), ROLLERS)
     state = body.onset
     state.u *= 1.005
     state.grip *= 1.005

@@ -174,11 +174,12 @@ def draw_deletion(axes: Sequence[Axes], points: Points) -> None:
                 markersize=3.5, fillstyle="none", label=f"force floor {floor:g}")
     ax.axhline(1e-2, color="0.6", linewidth=0.6, linestyle=":")
     ax.annotate("warning", (1e-9, 1e-2), xytext=(2, 2), textcoords="offset points", fontsize=7, color="0.4")
+    ax.annotate("none", (1e-9, 1e-14), xytext=(2, 3), textcoords="offset points", fontsize=7, color="0.4")
     ax.axvspan(1e-2, 1, color="#f6e3e1")
     ax.set(xscale="log", yscale="log", xlabel=r"$\gamma$ at which an element is deleted",
            ylabel="energy deleted with them\n(of the onset)", xlim=(5e-10, 1),
            title="Deletion of elements that carry energy")
-    ax.legend()
+    ax.legend(loc=(0.02, 0.66))
 
 
 # --- alpha ---
@@ -211,4 +212,4 @@ def draw_alpha(axes: Sequence[Axes], points: Points) -> None:
     ax.plot(a, [p["last"] for p in mine], color=BLUE, label=r"at $\omega\Delta t=10^4$")
     ax.axhline(1, color="0.6", linewidth=0.6, linestyle=":")
     ax.set(xlabel=r"$\alpha$", ylabel="spectral radius", title=r"HHT: $\alpha$ outside its range")
-    ax.legend()
+    ax.legend(loc=(0.12, 0.62))
