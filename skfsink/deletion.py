@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 
 from .momentum import Momentum
 from .space import Space
@@ -18,8 +19,7 @@ def delete_failed(space: Space, state: State, threshold: float, failure_energy: 
     (volume) times psi_f is added to U (Eq. 30). Call it on accepted states only: a trial that is given up must not
     leave holes.
     """
-    spent = space.at_gauss(state.gamma) <= threshold
-    failed = np.flatnonzero(spent.all(axis=1) & ~state.deleted)
+    failed = np.flatnonzero(_spent(state.gamma, space.nodes, space.N, threshold, state.deleted))
     if failed.size:
         state.deleted[failed] = True
         state.deletions.extend((state.time, int(e)) for e in failed)
@@ -37,3 +37,22 @@ def left_in(momentum: Momentum, gamma: np.ndarray, failed: np.ndarray) -> float:
     if not at_gauss.any():
         return 0.0
     return float(np.einsum("eq,eq,eq->", momentum.space.w[failed], at_gauss, momentum.W[failed]))
+
+
+@njit(cache=True)
+def _spent(nodal, conn, N, threshold, deleted):  # type: ignore[no-untyped-def]
+    """Mask of the elements, not yet deleted, whose Q1 field is at most `threshold` at all Gauss points."""
+    out = np.zeros(conn.shape[0], np.bool_)
+    nq, na = N.shape
+    for e in range(conn.shape[0]):
+        if deleted[e]:
+            continue
+        out[e] = True
+        for q in range(nq):
+            value = 0.0
+            for a in range(na):
+                value += N[q, a] * nodal[conn[e, a]]
+            if value > threshold:
+                out[e] = False
+                break
+    return out

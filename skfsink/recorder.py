@@ -52,6 +52,7 @@ class Recorder:
         self.series.resume(len(self.frames))  # this may refuse, before any file is touched
         self.history = History(folder / "history.csv", memory["rows"], space.dim)
         self._load_nodes = held[0]
+        self._marked: np.ndarray | None = None  # gamma when the tracker last looked; a solve makes a new array
         first = np.array([v or 0.0 for v in scene.grips[0].velocity])
         self._load_direction = first / (np.linalg.norm(first) or 1.0)
         controls = scene.controls
@@ -89,7 +90,8 @@ class Recorder:
     def watch(self, state: State, reaction: np.ndarray, before: float, dt: float) -> bool:
         """To be called after each step from time `before`; True when a row was written."""
         self.guard.check_step(state)
-        arrived = self.tracker.mark(state.time, state.gamma)
+        arrived = state.gamma is not self._marked and self.tracker.mark(state.time, state.gamma)
+        self._marked = state.gamma
         due = int(state.time / self._record_every) != int(before / self._record_every)
         if not (due or arrived):
             return False

@@ -154,7 +154,7 @@ class Space:
     def at_gauss(self, nodal: np.ndarray) -> np.ndarray:
         """Values (ne, nq) at the Gauss points of the Q1 field with nodal values (n,)."""
         out = np.empty_like(self.w)
-        _at_gauss(np.ascontiguousarray(nodal, float), self._nodes, self.N, out)
+        _at_gauss(np.ascontiguousarray(nodal, float), self.nodes, self.N, out)
         return out
 
     def gradient(self, nodal: np.ndarray) -> np.ndarray:
@@ -175,11 +175,11 @@ class Space:
     def lump(self, values: np.ndarray) -> np.ndarray:
         """Row sums of the mass matrix with weight `values` (ne, nq):  sum_q w_q values_q N_a(q), (n,)."""
         out = np.zeros(self.n_nodes)
-        _lump(self.w, np.ascontiguousarray(values, float), self._nodes, self.N, out)
+        _lump(self.w, np.ascontiguousarray(values, float), self.nodes, self.N, out)
         return out
 
     @cached_property
-    def _nodes(self) -> np.ndarray:
+    def nodes(self) -> np.ndarray:
         """`conn` unsigned, which spares the compiled loops a test for negative indices."""
         return self.conn.astype(np.uint32)
 

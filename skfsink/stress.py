@@ -34,11 +34,11 @@ def _at_points(momentum: Momentum, u: np.ndarray, part: slice, gamma: np.ndarray
     F = np.zeros((*gamma.shape, 3, 3))
     F[...] = np.eye(3)
     F[..., :space.dim, :space.dim] += np.einsum("eai,eqaJ->eqiJ", u[space.conn[part]], space.dN[part])
-    raw = np.linalg.det(F)
+    raw = _determinant(F)
     F[raw < J_FLOOR] = np.eye(3)  # only points without stiffness get there
     if momentum.plane_stress:
         F = material.thin_sheet(F[..., :2, :2])
-    J_bar = J = np.linalg.det(F)
+    J_bar = J = _determinant(F)
     gamma_bar = gamma
     if momentum.j_bar:
         w = space.w[part]
@@ -47,13 +47,20 @@ def _at_points(momentum: Momentum, u: np.ndarray, part: slice, gamma: np.ndarray
         tau = material.isochoric_stress(F, fibres=momentum.fibres[part][:, None]) @ np.swapaxes(F, -1, -2)
         return np.asarray((gamma / J)[..., None] * tau[..., _VOIGT[0], _VOIGT[1]]
                           + (gamma_bar * k * (J_bar - 1))[..., None] * np.array([1.0, 1, 1, 0, 0, 0]))
-    b = np.einsum("eqiJ,eqjJ->eqij", F, F)
+    b = F @ np.swapaxes(F, -1, -2)
     trace = np.trace(b, axis1=-2, axis2=-1)
     _, slope, _ = material.isochoric(J ** (-2 / 3) * trace)
     shear = gamma * slope * J ** (-5 / 3)
     mean = gamma_bar * k * (J_bar - 1) - 2 / 3 * shear * trace
     return np.asarray(2 * shear[..., None] * b[..., _VOIGT[0], _VOIGT[1]]
                       + mean[..., None] * np.array([1.0, 1, 1, 0, 0, 0]))
+
+
+def _determinant(F: np.ndarray) -> np.ndarray:
+    """Of matrices (..., 3, 3); several times as fast as by factorisation."""
+    return np.asarray(F[..., 0, 0] * (F[..., 1, 1] * F[..., 2, 2] - F[..., 1, 2] * F[..., 2, 1])
+                      - F[..., 0, 1] * (F[..., 1, 0] * F[..., 2, 2] - F[..., 1, 2] * F[..., 2, 0])
+                      + F[..., 0, 2] * (F[..., 1, 0] * F[..., 2, 1] - F[..., 1, 1] * F[..., 2, 0]))
 
 
 def pressure(stress: np.ndarray) -> np.ndarray:
