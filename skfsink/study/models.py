@@ -106,7 +106,7 @@ class _Run:
 # --- what comes out ---
 #: what may be moved: how it is called, and where it is in a point
 MOVED = {"onset opening": ("onset", "opening_mm"), "onset reaction": ("onset", "reaction_N_per_mm"),
-         "arrival time": ("arrival_us",), "D": ("D",)}
+         "arrival time": ("arrival_us",), "D": ("D",), "U": ("U",)}
 
 
 def changes(points: Points) -> list[dict[str, Any]]:
