@@ -154,10 +154,11 @@ def draw(points: Points, path: Path) -> None:
     """A line a variant: cost over that of its base, and how far onset, arrival and D move; bars span the meshes."""
     rows = [row for row in changes(points) if "cost" in row]
     groups = list(dict.fromkeys(row["group"] for row in rows))
-    names = ("cost", "onset opening", "arrival time", "D")
-    labels = ("cost over that\nof the base", "change of the\nonset opening", "change of the\narrival time",
-              "change of $D$\nat the arrival")
-    with page(path, "What choices of the model save, and what they move", 1, 4, 1.4 + 0.17 * len(rows)) as axes:
+    names = ("cost", "onset opening", "arrival time", "D", "U")
+    labels = ("cost over that\nof the base", "change of the\nonset opening (%)", "change of the\narrival time (%)",
+              "change of $D$\nat the arrival (%)", "change of $U$\nat the arrival (%)")
+    written = [row["name"] if row["group"] in row["name"] else f"{row['group']}: {row['name']}" for row in rows]
+    with page(path, "What choices of the model save, and what they move", 1, 5, 1.4 + 0.17 * len(rows)) as axes:
         for ax, name, label in zip(axes, names, labels):
             for y, row in enumerate(rows):
                 mean, low, high = row[name]
@@ -165,13 +166,16 @@ def draw(points: Points, path: Path) -> None:
                 ax.plot([low, high], [y, y], color=colour, linewidth=1.6, alpha=0.5)
                 ax.plot(mean, y, "o", ms=3.5, color=colour)
             ax.set(xlabel=label, ylim=(len(rows) - 0.4, -0.6))
-            ax.set_yticks(range(len(rows)), [row["name"] for row in rows] if ax is axes[0] else [])
+            ax.set_yticks(range(len(rows)), written if ax is axes[0] else [])
             ax.grid(axis="y", linewidth=0.3, color="0.85")
             if name == "cost":
-                ax.set_xscale("log")
                 ax.axvline(1.0, color="0.4", linewidth=0.6)
             else:
                 ax.set_xscale("symlog", linthresh=0.01)
+                shown = [v for row in rows for v in row[name]]
+                ticks = [t for t in (-0.1, 0.0, 0.1, 1.0) if min(shown) <= t <= max(shown)]
+                ax.set_xticks(ticks, [f"{100 * t:+g}" if t else "0" for t in ticks])
+                ax.minorticks_off()
                 ax.axvline(0.0, color="0.4", linewidth=0.6)
                 noise = [row[name] for row in rows if row["group"] == "nothing"]
                 if noise:

@@ -107,7 +107,7 @@ def draw_headline(time: Points, space: Points, path: Path) -> None:
         axes[0].set(title="dynamic event, by integrator", ylabel="relative error of the tip history (L2)")
         refinement.panel(axes[1], space, "onset opening")
         axes[1].set(title="loading to the onset, by element and mesh")
-        axes[0].legend(fontsize=5.5, loc="upper left", bbox_to_anchor=(0.5, -0.19), borderaxespad=0)
+        axes[0].legend(fontsize=5.5, loc="upper left", bbox_to_anchor=(0.58, -0.19), borderaxespad=0)
         axes[1].legend(fontsize=5.5, loc="upper right")
 
 

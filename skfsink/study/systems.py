@@ -6,12 +6,14 @@ measured and what takes too long can be ended.
 
 from __future__ import annotations
 
+import ctypes
 import json
 import os
 import sys
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -269,6 +271,8 @@ class _Watch:
         self.rise = 0.0  #: greatest rise of the resident memory [bytes]
 
     def __enter__(self) -> _Watch:
+        with suppress(OSError, AttributeError):  # what the system's assembly left behind would be used again unseen
+            ctypes.CDLL("libc.so.6").malloc_trim(0)
         self._first, self._start = self._process.memory_info().rss, time.monotonic()
         self._thread = threading.Thread(target=self._follow, daemon=True)
         self._thread.start()
