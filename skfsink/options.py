@@ -130,8 +130,8 @@ class Options:
     checkpoint_every
         Wall time between checkpoints [s], > 0.
     threads
-        Threads that share factorisations and loops over elements, >= 0; 0 takes OMP_NUM_THREADS or the machine's cores,
-        at most 4. Runs with the same number agree to the last bit.
+        Threads that share factorisations and loops over elements, >= 0; 0 takes one for a plane body and else
+        OMP_NUM_THREADS or the machine's cores, at most 4. Runs with the same number agree to the last bit.
     out
         Output folder; default results/CASE/MESH-ANALYSIS[-INTEGRATOR].
     resume

@@ -66,8 +66,8 @@ class Controls:
     frame_every: time between frames of the ParaView series [s], > 0.
     balance_tolerance: balance error, relative to the onset energy, at which a run is stopped, (0, 1].
     checkpoint_every: wall time between checkpoints [s], > 0.
-    threads: that share factorisations and loops over elements, >= 0; 0 takes OMP_NUM_THREADS or the machine's cores,
-        at most 4. Runs with the same number agree to the last bit.
+    threads: that share factorisations and loops over elements, >= 0; 0 takes one for a plane body and else
+        OMP_NUM_THREADS or the machine's cores, at most 4. Runs with the same number agree to the last bit.
     start: of a dynamic analysis, "onset" (statics up to there) or "rest" (see :mod:`.rest`).
     active_zone: explicit steps solve for gamma only where it changes (see :mod:`.zone`).
     """
@@ -109,12 +109,12 @@ class Controls:
         require("balance-tolerance", self.balance_tolerance, low=0, high=1, low_open=True)
         require("threads", self.threads, low=0, high=256, whole=True)
 
-    @property
-    def workers(self) -> int:
-        """Number of threads to use, >= 1."""
+    def workers(self, dim: int) -> int:
+        """Number of threads to use for a body of that dimension, >= 1."""
         asked = os.environ.get("OMP_NUM_THREADS", "")
-        cores = int(asked) if asked.isdecimal() and int(asked) else numba.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]
-        return self.threads or min(cores, 4)
+        most: int = numba.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]
+        cores = int(asked) if asked.isdecimal() and int(asked) else most
+        return self.threads or (1 if dim == 2 else min(cores, 4))
 
 
 def _first_two(X: np.ndarray) -> np.ndarray:

@@ -61,10 +61,10 @@ class Simulation:
         self.scene, self.folder, self.display = scene, folder, display
         c, space = scene.controls, scene.sample.space
         self.free, self.grip_velocity = scene.constraints()
-        self.momentum = Momentum(space, scene.material, c.element, c.force_floor, c.workers)
+        self.momentum = Momentum(space, scene.material, c.element, c.force_floor, c.workers(space.dim))
         self.density = DensitySolver(space, scene.sink_law, c.sink, active_zone=c.active_zone)
         self.statics = Statics(self.momentum, self.density, self.free, self.grip_velocity, c.statics, c.deletion,
-                               c.workers)
+                               c.workers(space.dim))
         self.recorder = Recorder(scene, folder, self.momentum, self.density,
                                  stored[2]["recorder"] if stored else None)
         self.notes = Notes(display.say, stored[2].get("warnings", []) if stored else [])
@@ -151,17 +151,17 @@ class Simulation:
         self.recorder.start(state, reaction)
 
     def _make_integrator(self) -> None:
-        c = self.scene.controls
+        c, threads = self.scene.controls, self.scene.controls.workers(self.scene.sample.space.dim)
         if self.state.phase == "loading":
             self._from_rest = LoadingFromRest(self.momentum, self.density, self.free, self.grip_velocity, c.hht,
-                                              c.deletion, c.workers)
+                                              c.deletion, threads)
             self.integrator = self._from_rest.integrator
         elif c.integrator == "explicit":
             self.integrator = Explicit(self.momentum, self.density, self.free, self.grip_velocity, c.explicit,
                                        c.deletion)
         else:
             self.integrator = HHT(self.momentum, self.density, self.free, self.grip_velocity, c.hht, c.deletion,
-                                  c.workers)
+                                  threads)
 
     def _integrate(self) -> None:
         state, integrator, recorder = self.state, self.integrator, self.recorder
