@@ -61,10 +61,12 @@ class HHT:
     ----------
     dt: size of the next step [s].   rejected: steps given up.   iterations: Newton iterations made.
     reaction: (n, dim) internal force of the last accepted state.
-    loading: long steps that are cut where failure begins are what is wanted.
+    loading: in loading, steps are long, and near the limit load what takes iterations is that gamma follows slowly:
+        factors are kept for it, and a step in which it runs away is cut at once, without a warning.
     """
 
     loading = False
+    FRESH, KEPT = 3, 25  # iterations of a loading step with factors of their own; then these serve so many
     GROW = 1.5
     LEAST_J = 0.02
 
@@ -168,6 +170,7 @@ class HHT:
         u[self._held] = (state.u + dt * self._grip_velocity)[self._held]
         a[self._held] = 0.0
         correction, settled = np.inf, c.coupling == "single"
+        change, growing = np.inf, 0
         for iteration in range(c.max_iterations + 1):
             force = momentum.force(u)
             if not (momentum.least_J > self.LEAST_J and np.isfinite(momentum.energy)):
@@ -192,10 +195,11 @@ class HHT:
                 return _Trial(u, a, gamma, force, momentum.W, mass, self.inertia.places()), iteration
             if iteration == c.max_iterations:
                 break
-            data = mass / (c.beta * dt * dt) + (1 + c.alpha) * momentum.tangent(self._pattern, u)
             self.iterations += 1
             try:
-                self.solver.factorize(data)
+                if not self.loading or iteration < self.FRESH or iteration % self.KEPT == 0:
+                    self.solver.factorize(mass / (c.beta * dt * dt)
+                                          + (1 + c.alpha) * momentum.tangent(self._pattern, u))
                 d = self.solver.solve(-r, tolerance=1e-8)
             except ConvergenceError:
                 return None, iteration
@@ -209,7 +213,11 @@ class HHT:
                 if not (momentum.least_J > self.LEAST_J and np.isfinite(momentum.energy)):
                     return None, iteration
                 new = self.density.solve(np.maximum(state.W_max, momentum.W), gamma)
-                settled = float(np.abs(new - gamma).max()) <= c.gamma_tolerance
+                last, change = change, float(np.abs(new - gamma).max())
+                settled = change <= c.gamma_tolerance
+                growing = growing + 1 if change > 0.98 * last else 0
+                if self.loading and growing >= 3:
+                    return None, iteration
                 gamma = new
                 momentum.set_gamma(gamma, state.deleted)
                 mass = self.inertia.matrix()
