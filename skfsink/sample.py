@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
 import inspect
-import io
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +13,8 @@ import numpy as np
 import skfem
 from skfem.io.meshio import INV_HEX_MAPPING
 
-from .errors import MeshError, ParameterError, SkfsinkError, require
+from .errors import MeshError, ParameterError, require
+from .mesh_file import one_line, quietly, read_mesh_file
 from .meshing import read_mesh
 from .shapes import SHAPES
 from .space import Space
@@ -52,7 +51,7 @@ class Sample:
         """
         if boundary not in self.boundaries:
             raise MeshError(f"mesh {self.name} has no boundary {boundary!r}; it has "
-                            f"{', '.join(sorted(self.boundaries)) or 'none'}")
+                            f"{one_line(', '.join(sorted(self.boundaries))) or 'none'}")
         return self.boundaries[boundary]
 
     def rim(self, *faces: str) -> np.ndarray:
@@ -88,18 +87,15 @@ def load_sample(case: str, mesh: str, make: Callable[[], meshio.Mesh] | None = N
     """
     lift = lift or _as_it_is
     if make is not None:
-        return _from_meshio(mesh, lift(_read(make, f"the mesh {mesh} cannot be made")), made=True)
+        return _from_meshio(mesh, lift(quietly(make, f"the mesh {mesh} cannot be made")), made=True)
     folder = data_folder(case) / "meshes"
     known = sorted(p.stem for p in folder.glob("*.vtu"))
     path = folder / f"{mesh}.vtu"
-    if mesh not in known:
-        path = Path(mesh)
-        if not path.suffix:
-            raise MeshError(f"mesh must be one of {', '.join(known)}, or the path of a mesh file; got {mesh!r}")
-        if not path.is_file():
-            raise MeshError(f"there is no mesh file {mesh}")
-        lift = _as_it_is
-    return _from_meshio(mesh, lift(_read(lambda: read_mesh(path), f"the mesh file {path} cannot be read")))
+    if mesh in known:
+        return _from_meshio(mesh, lift(quietly(lambda: read_mesh(path), f"the mesh file {path} cannot be read")))
+    if not Path(mesh).suffix:
+        raise MeshError(f"mesh must be one of {', '.join(known)}, or the path of a mesh file; got {mesh!r}")
+    return _from_meshio(mesh, read_mesh_file(Path(mesh)))
 
 
 def shape_sample(case: str, own: Mapping[str, Any], lift: Callable[[meshio.Mesh], meshio.Mesh] | None = None,
@@ -149,36 +145,25 @@ def _as_it_is(mesh: meshio.Mesh) -> meshio.Mesh:
     return mesh
 
 
-def _read(source: Callable[[], meshio.Mesh], failure: str) -> meshio.Mesh:
-    """The mesh from a library that prints, exits and raises what it likes."""
-    try:
-        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
-            return source()
-    except SkfsinkError:
-        raise
-    except (Exception, SystemExit) as error:
-        reason = str(error).strip() or type(error).__name__
-        raise MeshError(f"{failure}: {reason.splitlines()[0]}") from None
-
-
 def _from_meshio(name: str, data: meshio.Mesh, made: bool = False) -> Sample:
+    shown = one_line(name)
     present = [kind for kind in _CELLS if kind in data.cells_dict]
     others = sorted({b.type for b in data.cells} - {"quad", "hexahedron", "line", "vertex"})
     if others or not any(len(data.cells_dict[kind]) for kind in present):
-        raise MeshError(f"mesh {name} must consist of quadrilaterals or hexahedra; it has "
+        raise MeshError(f"mesh {shown} must consist of quadrilaterals or hexahedra; it has "
                         f"{', '.join(sorted({b.type for b in data.cells})) or 'no cells'}")
     kind = "hexahedron" if "hexahedron" in present else "quad"
     mesh_class, facet = _CELLS[kind]
     cells = data.cells_dict[kind]
     if cells.min() < 0 or cells.max() >= len(data.points):
-        raise MeshError(f"mesh {name} has elements with nodes that do not exist")
+        raise MeshError(f"mesh {shown} has elements with nodes that do not exist")
     dim = 2 if kind == "quad" else 3
     points = np.asarray(data.points, float)[:, :dim]
     connectivity = cells.T if kind == "quad" else cells[:, INV_HEX_MAPPING[:8]].T
     try:
         space = Space(mesh_class(np.ascontiguousarray(points.T), np.ascontiguousarray(connectivity.astype(np.int64))))
     except MeshError as error:
-        raise MeshError(f"mesh {name}: {error}") from None
+        raise MeshError(f"mesh {shown}: {error}") from None
     return Sample(Path(name).stem, space, _boundaries(data, facet), made)
 
 

@@ -1,0 +1,160 @@
+"""Mesh files of the user: read within bounds of size and memory, and checked before anything is computed on them.
+
+A file is not trusted. It may claim more than it holds, name other files, or hold what is no body; each of these is a
+MeshError of one line, and nothing is written.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import stat
+import warnings
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import meshio
+import numpy as np
+import psutil
+
+from .errors import MeshError, SkfsinkError
+from .meshing import read_mesh
+
+__all__ = ["check_mesh", "one_line", "quietly", "read_mesh_file"]
+
+LARGEST = 2 * 10**9        # bytes of a mesh file
+ROOM = (10**9, 30)         # memory to read one [bytes]: at least this, or this many times its size
+POINTERS = (".xdmf", ".xmf", ".node", ".ele")  # formats that are spread over several files
+EXTENT = (1e-9, 1e9)       # mm across
+
+
+def one_line(text: str) -> str:
+    """`text` as it may stand in a message: what cannot be printed escaped, cut after 200 characters."""
+    text = text if text.isprintable() else ascii(text)[1:-1]
+    return text if len(text) <= 200 else text[:200] + "…"
+
+
+def quietly(source: Callable[[], meshio.Mesh], failure: str) -> meshio.Mesh:
+    """The mesh from a library that prints, exits and raises what it likes.
+
+    Raises
+    ------
+    MeshError
+        `failure`, and the first line of the reason.
+    """
+    try:
+        with (contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()),
+              warnings.catch_warnings(action="ignore")):
+            return source()
+    except SkfsinkError:
+        raise
+    except (Exception, SystemExit) as error:
+        reason = str(error).strip() or type(error).__name__
+        raise MeshError(f"{failure}: {one_line(reason.splitlines()[0])}") from None
+
+
+def read_mesh_file(path: Path) -> meshio.Mesh:
+    """The mesh in a file, checked by :func:`check_mesh`.
+
+    Raises
+    ------
+    MeshError
+        There is no such file, it is too large, names other files, cannot be read, or holds no mesh to compute on.
+    """
+    shown = one_line(str(path))
+    failure = f"the mesh file {shown} cannot be read"
+    try:
+        status = os.stat(path)
+    except (OSError, ValueError):
+        raise MeshError(f"there is no mesh file {shown}") from None
+    if not stat.S_ISREG(status.st_mode):
+        raise MeshError(f"there is no mesh file {shown}: what has that name is no file with content")
+    if status.st_size > LARGEST:
+        raise MeshError(f"{failure}: it has {status.st_size / 1e9:.1f} GB, the most is {LARGEST / 1e9:.0f} GB")
+    suffix = path.suffix.lower()
+    if suffix in POINTERS or (suffix == ".inp" and _includes(path)):
+        raise MeshError(f"{failure}: it names other files; put the mesh into one file, such as VTU")
+    with _room(max(ROOM[0], ROOM[1] * status.st_size)):
+        mesh = quietly(lambda: read_mesh(path), failure)
+        quietly(lambda: _sound(mesh), failure)
+    check_mesh(shown, mesh)
+    return mesh
+
+
+def check_mesh(name: str, mesh: meshio.Mesh) -> None:
+    """See that points, elements and boundaries belong together.
+
+    Raises
+    ------
+    MeshError
+        Elements or boundaries name nodes that do not exist, an element has a node twice or is there twice, nodes have
+        no finite coordinates, plane elements do not lie in a plane of constant z, or the body is not of a size in mm.
+    """
+    points, blocks = mesh.points, mesh.cells
+    for block in blocks:
+        if not isinstance(block.data, np.ndarray) or block.data.dtype.kind not in "iu" or (
+                block.data.size and not 0 <= block.data.min() <= block.data.max() < len(points)):
+            raise MeshError(f"mesh {name} has elements with nodes that do not exist")
+    kind = next((k for k in ("hexahedron", "quad") if len(mesh.cells_dict.get(k, ()))), None)
+    if kind is None:
+        return  # the sample says what is there instead
+    if not np.isfinite(points).all():
+        raise MeshError(f"mesh {name}: the mesh has a node whose coordinates are not finite numbers")
+    extents = [points[:, i].max() / 2 - points[:, i].min() / 2 for i in range(3)]  # halves: no overflow
+    if not EXTENT[0] <= 2 * max(extents[:2]) <= EXTENT[1]:
+        raise MeshError(f"mesh {name} must be {EXTENT[0]:g} to {EXTENT[1]:g} mm across; got {2 * max(extents[:2]):g}")
+    if kind == "quad" and extents[2] > 1e-6 * max(extents[:2]):
+        raise MeshError(f"mesh {name} must have its quadrilaterals in a plane of constant z; "
+                        f"they reach over {2 * extents[2]:g} mm")
+    nodes = np.sort(mesh.cells_dict[kind].astype(np.int64), axis=1)
+    if (twice := (nodes[:, 1:] == nodes[:, :-1]).any(axis=1)).any():
+        raise MeshError(f"mesh {name}: element {int(twice.argmax())} is inverted or degenerate: it has a node twice")
+    rows = np.ascontiguousarray(nodes).view(np.dtype((np.void, nodes.itemsize * nodes.shape[1]))).ravel()
+    if (again := len(rows) - len(np.unique(rows))):
+        raise MeshError(f"mesh {name} has {again} element(s) more than once")
+    for boundary, members in mesh.cell_sets.items():
+        for block, index in zip(blocks, members):
+            if index is not None and len(index) and not 0 <= np.min(index) <= np.max(index) < len(block.data):
+                raise MeshError(f"mesh {name}: the boundary {one_line(boundary)!r} has cells that do not exist")
+
+
+def _sound(mesh: meshio.Mesh) -> meshio.Mesh:
+    """Give the arrays of a mesh the types and shapes that they are to have."""
+    points = np.asarray(mesh.points, float)
+    if points.ndim != 2 or not 2 <= points.shape[1] <= 3:
+        raise ValueError("its points are not given by two or three coordinates")
+    mesh.points = np.column_stack([points, np.zeros((len(points), 3 - points.shape[1]))])
+    physical = mesh.cell_data.get("gmsh:physical", [])
+    for name, (tag, dim) in mesh.field_data.items() if physical else ():  # older formats of gmsh make no sets of these
+        mesh.cell_sets.setdefault(name, [np.flatnonzero(np.equal(tags, tag) & (block.dim == dim))
+                                         for tags, block in zip(physical, mesh.cells)])
+    for members in mesh.cell_sets.values():
+        members[:] = [None if index is None else np.asarray(index, np.int64).ravel() for index in members]
+    return mesh
+
+
+def _includes(path: Path) -> bool:
+    with contextlib.suppress(OSError), path.open("rb") as file:
+        return any(line.lstrip().replace(b"*", b"").partition(b",")[0].strip().lower() == b"include"
+                   for line in file if line.lstrip().startswith(b"*"))
+    return False
+
+
+@contextlib.contextmanager
+def _room(size: int) -> Iterator[None]:
+    """Let this process take no more than `size` bytes besides what it has, where the system can see to it."""
+    try:
+        import resource
+
+        old = resource.getrlimit(resource.RLIMIT_AS)
+        most = psutil.Process().memory_info().vms + size
+        if old[0] == resource.RLIM_INFINITY or most < old[0]:
+            resource.setrlimit(resource.RLIMIT_AS, (most, old[1]))
+    except (ImportError, OSError, ValueError, psutil.Error):
+        yield
+        return
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, old)
