@@ -190,7 +190,8 @@ def table(points: Points) -> list[str]:
             cells = [f"× {row['cost'][0]:.2f}"]
             for name in MOVED:
                 mean, low, high = (100 * v for v in row[name])
-                cells.append(f"{mean:+.1f} % ({low:+.1f} … {high:+.1f})")
+                nothing = max(abs(low), abs(high)) < 0.05
+                cells.append("0" if nothing else f"{mean:+.1f} % ({low:+.1f} … {high:+.1f})")
         else:
             cells = ["", *[""] * len(MOVED)]
         if "failed" in row:
