@@ -15,6 +15,7 @@ from typing import Any
 from .checkpoint import load_checkpoint, load_state
 from .corridor import MESH, corridor_report, has_gmsh, lay_corridor
 from .errors import OutputError, ParameterError
+from .memory import check_memory
 from .models import AUTO, choose_model
 from .options import NOT_PHYSICS, Options
 from .output import History, prepare_folder, write_atomic, write_summary
@@ -62,11 +63,13 @@ def run_case(case: Callable[..., Result], make_scene: SceneMaker, own: dict[str,
             if choice:
                 display.say(choice["text"])
             scene = replace(make_scene(own, options), choice=choice)
+            check_memory(scene, display)
             if not resume:
                 _begin(folder, options.overwrite)
                 if options.mesh_layout == "two-pass":
                     options = lay_corridor(scene, own, options, folder, display)
                     scene = replace(make_scene(own, options), choice=choice)
+                    check_memory(scene, display)
             if options.analysis == "both":
                 return _run_both(scene, folder, display, resume, note)
             return _run_one(scene, folder, display, resume, note=note)
