@@ -12,7 +12,8 @@ from .cli import run
 __all__ = ["main"]
 
 COMMANDS = {"run": "run:run", "list": "cases:list_cases", "show": "show:show", "resume": "resume:resume",
-            "sweep": "sweep:sweep", "report": "report:report", "render": "render:render", "material": "material:material"}
+            "sweep": "sweep:sweep", "report": "report:report", "render": "render:render",
+            "material": "material:material"}
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -102,7 +102,7 @@ def first_pass(scene: Scene, folder: Path, display: Display) -> tuple[np.ndarray
 
 def lay_corridor(scene: Scene, own: Mapping[str, Any], options: Options, folder: Path,
                  display: Display) -> Options:
-    """Make the mesh of two passes in the folder of a run; `scene` is that of the first one. Returns the options with it.
+    """Make the mesh of two passes in the folder of a run, and return the options with it; `scene` is the first one's.
 
     Raises
     ------

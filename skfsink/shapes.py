@@ -59,7 +59,7 @@ def simple_shear_mesh(*, side: float = 4.0, notch: float = 2.0, notch_width: flo
     """
     check_plate(side, notch, notch_width)
     require("half-width", half_width, "mm", low=0, low_open=True)
-    middle, r = side / 2, notch_width / 2
+    middle = side / 2
     tip: Box = (notch - 0.25, notch + 0.35, middle - 0.35, middle + 0.35)
     path: Band = (notch, middle, notch + 0.75 * middle, 0, half_width)
     return _edge_notched(side, notch, notch_width, SizeField(h, h_coarse, (tip,), (path,), distance=distance), symmetry,
