@@ -1,0 +1,200 @@
+"""The documentation: its examples run, its commands exist, its messages are those of the program, its links hold."""
+
+from __future__ import annotations
+
+import ast
+import importlib.util
+import re
+import shlex
+from collections.abc import Iterator
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+from plates import invoke_program, plate
+
+import skfsink
+from skfsink import sample
+from skfsink.cases.single_edge_notch import single_edge_notch
+from skfsink.cli import command
+from skfsink.deck import CASES, case_function, parameters_of
+from skfsink.meshing import write_mesh
+from skfsink.options import Options
+from skfsink.sweep.vary import read_variation
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGES = {path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8")
+         for path in (*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"))}
+FENCE = re.compile(r"^```(\w+)\n(.*?)^```", re.DOTALL | re.MULTILINE)
+RUN = ("list", "show", "material")  # commands cheap enough to be run
+#: errors whose words stand elsewhere: their rows are found by these
+ELSEWHERE = {"… … of the onset energy at …, allowed …: …; only then raise --balance-tolerance": "energy balance error"}
+
+
+def blocks(page: str, language: str) -> list[str]:
+    """The blocks of a page in a language."""
+    return [text for name, text in FENCE.findall(PAGES[page]) if name == language]
+
+
+def made(name: str) -> ModuleType:
+    """A module of docs/make."""
+    spec = importlib.util.spec_from_file_location(name, ROOT / "docs" / "make" / f"{name}.py")
+    assert spec and spec.loader
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+# --- examples ---
+@pytest.fixture
+def place(tmp_path: Path) -> Iterator[Path]:
+    """A folder to run examples in, in which the mesh `coarse` of the plate has 79 elements; with the deck of the
+    pages."""
+    (tmp_path / "cases" / "meshes").mkdir(parents=True)
+    write_mesh(tmp_path / "cases" / "meshes" / "coarse.vtu", plate(9))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(tmp_path)
+        patch.setattr(sample, "data_folder", lambda case: tmp_path / "cases")
+        (deck,) = blocks("docs/first_crack.md", "toml")
+        (tmp_path / "plate.toml").write_text(deck)
+        yield tmp_path
+
+
+def programs() -> dict[str, list[str]]:
+    """By page the Python examples that bring their imports, each once; the others are parts of something."""
+    found: dict[str, list[str]] = {}
+    for page in sorted(PAGES, reverse=True):
+        known = [text for texts in found.values() for text in texts]
+        found[page] = [text for text in blocks(page, "python")
+                       if re.search(r"^(from|import) ", text, re.MULTILINE) and text not in known]
+    return {page: texts for page, texts in found.items() if texts}
+
+
+@pytest.mark.parametrize("page", programs())
+def test_examples_run(page: str, place: Path) -> None:
+    """Fails if an example, one after the other on its page, ends with an error."""
+    if page == "docs/results.md":  # which reads a run
+        options = Options(length_scale=0.9, quiet=True, out=place / "results" / "single_edge_notch" / "M3-dynamic")
+        single_edge_notch(mesh="coarse", options=options)
+    for text in programs()[page]:
+        exec(compile(text, page, "exec", dont_inherit=True), {"__name__": "example"})
+
+
+def test_there_are_examples() -> None:
+    """Fails if the blocks are not found any more."""
+    assert {page: len(texts) for page, texts in programs().items()}.items() >= {
+        "docs/first_crack.md": 4, "docs/results.md": 1, "CONTRIBUTING.md": 2}.items()
+
+
+def commands() -> list[str]:
+    """Command lines of the pages, without comments and redirections, once each."""
+    lines = {re.split(r"\s+#|\s+>", line)[0].strip() for page in PAGES for text in blocks(page, "bash")
+             for line in text.replace("\\\n", " ").splitlines()}
+    return sorted(line for line in lines if line.startswith(("skfsink ", "python -m skfsink.cases.")))
+
+
+def said_of(line: str, capsys: pytest.CaptureFixture[str]) -> str:
+    """The help of what a command line calls."""
+    if line.startswith("skfsink "):
+        status, _, said = invoke_program(shlex.split(line)[1], "--help")
+        assert status == 0
+        return str(said)
+    case = line.split()[2].removeprefix("skfsink.cases.")
+    if case == "NAME":
+        case = CASES[0]
+    with pytest.raises(SystemExit) as end:
+        command(case_function(case), ["--help"])
+    assert end.value.code == 0
+    return capsys.readouterr().out
+
+
+@pytest.mark.parametrize("line", commands())
+def test_commands_are_understood(line: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """Fails if a command, or an option in it, is unknown; cheap ones if they end with an error."""
+    words = shlex.split(line)
+    if words[0] == "skfsink" and words[1] in RUN:
+        status, err, out = invoke_program(*words[1:])
+        assert (status, err) == (0, "") and out
+        return
+    help_ = said_of(line, capsys)
+    for option, value in zip(words, [*words[1:], ""]):
+        assert not option.startswith("--") or re.search(rf"{option}\b", help_), option
+        assert option != "--vary" or read_variation(value, parameters_of("single_edge_notch"))
+
+
+# --- messages ---
+def templates(node: ast.AST) -> Iterator[str]:
+    """Texts in a piece of a program, with … for what is put in."""
+    for part in ast.walk(node):
+        if isinstance(part, ast.JoinedStr):
+            yield "".join(value.value if isinstance(value, ast.Constant) else "…" for value in part.values)
+        elif isinstance(part, ast.Constant) and isinstance(part.value, str):
+            yield re.sub(r"%[.\w]*[a-z]", "…", part.value).replace("%%", "%")
+
+
+def agree(row: str, text: str) -> bool:
+    """Whether what a row quotes is, piece by piece, in a text."""
+    pieces = [re.escape(piece.strip()) for piece in row.split("…") if piece.strip()]
+    return re.search(".*".join(pieces), text) is not None
+
+
+TREES = [ast.parse(path.read_text(encoding="utf-8")) for path in Path(skfsink.__file__).parent.rglob("*.py")
+         if "study" not in path.parts]
+QUOTED = [text for line in PAGES["docs/messages.md"].splitlines() if line.startswith("| `")
+          for text in re.findall(r"`([^`]+)`", line.split("|")[1])]
+
+
+def test_quoted_messages_are_those_of_the_program() -> None:
+    """Fails if a row quotes a message that the program does not have any more."""
+    texts = {text for tree in TREES for text in templates(tree)}
+    assert len(QUOTED) > 60
+    assert [row for row in QUOTED if not any(agree(row, text) for text in texts)] == []
+
+
+def test_warnings_and_failures_have_a_row() -> None:
+    """Fails if the program warns of something, or stops for something, that the page has no cure for."""
+    found = []
+    for tree in TREES:
+        for call in (node for node in ast.walk(tree) if isinstance(node, ast.Call) and node.args):
+            name = getattr(call.func, "id", getattr(call.func, "attr", ""))
+            if name in ("warning", "ConvergenceError", "InstabilityError"):
+                found += list(templates(call.args[0]))[:1]
+    missing = [text for text in found if not any(agree(row, ELSEWHERE.get(text, text)) for row in QUOTED)]
+    assert len(found) > 30 and missing == []
+
+
+# --- pages ---
+def test_links_hold_in_the_repository() -> None:
+    """Fails if a relative link, or its heading, does not exist."""
+    dead = []
+    for page, text in PAGES.items():
+        for target in re.findall(r"\]\((?!https?:)([^)\s]+)\)", FENCE.sub("", text)):
+            name, _, anchor = target.partition("#")
+            path = (ROOT / page).parent / name if name else ROOT / page
+            if not path.exists() or (anchor and "." not in anchor and anchor not in headings(path)):
+                dead.append(f"{page}: {target}")
+    assert dead == []
+
+
+def headings(path: Path) -> set[str]:
+    """Anchors of a page's headings, as GitHub makes them."""
+    found = re.findall(r"^#+ (.+)$", FENCE.sub("", path.read_text(encoding="utf-8")), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", text.strip().lower()).replace(" ", "-") for text in found}
+
+
+def test_the_page_of_scenes_is_up_to_date() -> None:
+    """Fails if docs/scenes.md is not what `python docs/make/scenes.py` writes."""
+    assert made("scenes").page() == PAGES["docs/scenes.md"]
+
+
+def test_formulas_become_mathml() -> None:
+    """Fails if bold letters are left to browsers, which ignore them, or an unknown command is shown as text."""
+    pytest.importorskip("mkdocs")
+    pytest.importorskip("latex2mathml")
+    from mkdocs.exceptions import PluginError
+
+    hooks = made("hooks")
+    text = hooks.mathml(r"\mathbf F^T\mathcal H<\tfrac{1}{2}", False)
+    assert "<mi>𝐅</mi>" in text and "<mi>ℋ</mi>" in text and "<mfrac>" in text and "&#x0003C;" in text
+    with pytest.raises(PluginError, match="cannot be shown"):
+        hooks.mathml(r"\nosuchcommand{x}", False)
