@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import _thread
 import signal
 import threading
 import time
@@ -68,11 +69,19 @@ class Display:
 
 
 class Interrupt:
-    """Turns Ctrl-C and SIGTERM into a flag that a run looks at between steps; a second Ctrl-C stops at once."""
+    """Turns Ctrl-C and SIGTERM into a flag that a run looks at between steps.
+
+    A second Ctrl-C stops at once; so does a step that goes on for `PATIENCE` after the first: its KeyboardInterrupt
+    leaves the checkpoint that was written last.
+    """
+
+    PATIENCE = 5.0  # seconds
 
     def __init__(self) -> None:
         self.received = False
         self._old: dict[int, Any] = {}
+        self._timer = threading.Timer(self.PATIENCE, _thread.interrupt_main)
+        self._timer.daemon = True
 
     def __enter__(self) -> Interrupt:
         if threading.current_thread() is threading.main_thread():
@@ -83,8 +92,17 @@ class Interrupt:
     def _note(self, number: int, frame: FrameType | None) -> None:
         if self.received and number == signal.SIGINT:
             raise KeyboardInterrupt
-        self.received = True
+        if not self.received:
+            self.received = True
+            self._timer.start()
+
+    def heeded(self) -> bool:
+        """Whether to stop; the caller is about to, and will not be hurried any more."""
+        if self.received:
+            self._timer.cancel()
+        return self.received
 
     def __exit__(self, *_: object) -> None:
+        self._timer.cancel()
         for number, handler in self._old.items():
             signal.signal(number, handler)

@@ -75,7 +75,7 @@ def run_case(case: Callable[..., Result], make_scene: SceneMaker, own: dict[str,
             return _run_one(scene, folder, display, resume, note=note)
     except (Interrupted, KeyboardInterrupt):
         begun = (folder / SCENE).exists()
-        raise Interrupted("interrupted; " + (f"go on with --resume {shlex.quote(str(folder))}" if begun else
+        raise Interrupted("interrupted; " + (f"go on with skfsink resume {shlex.quote(str(folder))}" if begun else
                                              "nothing was computed yet")) from None
 
 

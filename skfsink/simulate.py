@@ -98,7 +98,7 @@ class Simulation:
                 self.state.phase = "done"
             self._lap("event")
             self.checkpoint()
-            if interrupt.received:
+            if interrupt.heeded():
                 raise Interrupted("interrupted")
         return self.state
 
@@ -215,11 +215,12 @@ class Simulation:
 
     def _pause(self, phase: str) -> None:
         """Between steps: save a checkpoint when one is due, and stop when asked to."""
-        if self._interrupt.received or time.perf_counter() - self._saved > self.scene.controls.checkpoint_every:
+        stop = self._interrupt.heeded()
+        if stop or time.perf_counter() - self._saved > self.scene.controls.checkpoint_every:
             self._lap(phase)
             self.checkpoint()
             self._saved = time.perf_counter()
-            if self._interrupt.received:
+            if stop or self._interrupt.heeded():
                 raise Interrupted("interrupted")
 
     def _solver_counts(self) -> dict[str, int]:

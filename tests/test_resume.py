@@ -101,7 +101,7 @@ def test_interrupted_runs_say_how_to_go_on(kind: str, number: signal.Signals, me
         status, text = forked(go_on, stop, number)
         if status == 0:
             break
-        assert (status, text) == (130, f"skfsink: interrupted; go on with --resume '{out}'\n")
+        assert (status, text) == (130, f"skfsink: interrupted; go on with skfsink resume '{out}'\n")
         check_readable(out)
         go_on, stops = ["--resume", out, "--quiet"], stops + 1
     assert stops >= 2
@@ -116,7 +116,7 @@ def test_interrupted_while_drawing(number: signal.Signals, mesh: Path, tmp_path:
     out = tmp_path / "out"
     monkeypatch.setattr(skfsink.run, "draw_run", lambda *_: os.kill(os.getpid(), number))
     arguments = ["--mesh", mesh, "--out", out, "--event-time", "1e-6", *SMALL]
-    assert forked(arguments) == (130, f"skfsink: interrupted; go on with --resume {out}\n")
+    assert forked(arguments) == (130, f"skfsink: interrupted; go on with skfsink resume {out}\n")
     monkeypatch.setattr(skfsink.run, "draw_run", lambda *_: None)
     assert forked(["--resume", out, "--quiet"]) == (0, "") and figures(out)["event"]["duration_s"] >= 1e-6
 

@@ -6,7 +6,7 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,7 @@ def start(folder: Path, threads: int = 1) -> subprocess.Popen[bytes]:
                             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
 
 
-def here(folders: Sequence[Path], jobs: int) -> Iterator[Path]:
+def here(folders: Sequence[Path], jobs: int) -> Generator[Path, None, None]:
     """Run the folders, `jobs` at a time; yields each when it is done. Interrupted runs leave a checkpoint."""
     children: dict[Path, subprocess.Popen[bytes]] = {}
     stopped = False
@@ -32,6 +32,8 @@ def here(folders: Sequence[Path], jobs: int) -> Iterator[Path]:
     def one(folder: Path) -> Path:
         if not stopped:
             children[folder] = child = start(folder)
+            if stopped:  # meanwhile
+                child.send_signal(signal.SIGINT)
             child.wait()
         return folder
 
@@ -50,7 +52,7 @@ def here(folders: Sequence[Path], jobs: int) -> Iterator[Path]:
             raise
 
 
-def on_scheduler(folders: Sequence[Path], address: str) -> Iterator[Path]:
+def on_scheduler(folders: Sequence[Path], address: str) -> Generator[Path, None, None]:
     """Run the folders on the workers of the Dask scheduler at `address`, which must see the same files.
 
     A task whose worker dies is given to another one, which waits for a run that goes on without its worker, and takes

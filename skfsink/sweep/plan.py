@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from ..deck import Deck, parameters_of, read_deck
 from ..errors import OutputError, require
 from ..files import reported, write_atomic
 from ..progress import Display
+from ..simulate import Interrupted
 from .engine import here, on_scheduler
 from .one import DECK, FAILURE, finished
 from .table import draw, read_rows, write_csv, write_parquet
@@ -29,8 +31,8 @@ def run_sweep(path: Path, vary: Sequence[str], out: Path, jobs: int = 1, schedul
     ------
     ParameterError, OutputError, MissingExtra
         What was asked for cannot be; `out` holds another sweep.
-    KeyboardInterrupt
-        The runs that went on have left checkpoints; the same call goes on with them.
+    Interrupted
+        Ctrl-C or SIGTERM: the runs that went on have left checkpoints; the same call goes on with them.
     """
     require("jobs", jobs, low=1, high=256, whole=True)
     deck = read_deck(path)
@@ -45,11 +47,15 @@ def run_sweep(path: Path, vary: Sequence[str], out: Path, jobs: int = 1, schedul
         left = [folder for folder in folders if not finished(folder)]
         done = len(folders) - len(left)
         display.say(f"{len(folders)} runs of {deck.case} in {out}, {done} of them done already")
-        for folder in (on_scheduler(left, scheduler) if scheduler else here(left, jobs)) if left else ():
-            done += 1
-            failed = (folder / FAILURE).read_text().strip() if (folder / FAILURE).is_file() else ""
-            display.say(f"{folder.name}: {failed or 'done'}")
-            display.update(done / len(folders), f"{done} of {len(folders)} runs")
+        try:
+            with closing(on_scheduler(left, scheduler) if scheduler else here(left, jobs)) as ended:
+                for folder in ended if left else ():
+                    done += 1
+                    failed = (folder / FAILURE).read_text().strip() if (folder / FAILURE).is_file() else ""
+                    display.say(f"{folder.name}: {failed or 'done'}")
+                    display.update(done / len(folders), f"{done} of {len(folders)} runs")
+        except KeyboardInterrupt:
+            raise Interrupted(f"interrupted with {done} of {len(folders)} runs done; the same command goes on") from None
         rows = read_rows(folders, varied)
         write_csv(rows, out / "sweep.csv")
         if parquet:
