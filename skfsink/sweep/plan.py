@@ -55,7 +55,8 @@ def run_sweep(path: Path, vary: Sequence[str], out: Path, jobs: int = 1, schedul
                     display.say(f"{folder.name}: {failed or 'done'}")
                     display.update(done / len(folders), f"{done} of {len(folders)} runs")
         except KeyboardInterrupt:
-            raise Interrupted(f"interrupted with {done} of {len(folders)} runs done; the same command goes on") from None
+            raise Interrupted(f"interrupted with {done} of {len(folders)} runs done; the same command goes on"
+                              ) from None
         rows = read_rows(folders, varied)
         write_csv(rows, out / "sweep.csv")
         if parquet:
