@@ -19,6 +19,7 @@ ROOT = Path(__file__).resolve().parents[2]
 #: pages that stand at the top of the repository
 OUTSIDE = {"CONTRIBUTING.md": "contributing.md", "CHANGELOG.md": "changelog.md"}
 LINK = re.compile(r"(\]\()([^)#\s]+)")
+HEADING = re.compile(r"\\\((.*?)\\\)")
 FORMULA = re.compile(r'<(span|div) class="arithmatex">\\([(\[])(.*?)\\[)\]]</\1>', re.DOTALL)
 #: variants of letters that browsers no longer make themselves
 LETTER = re.compile(r'<(m[in]) mathvariant="(bold|script|bold-italic)">(&#x\w+;|.)</\1>')
@@ -92,7 +93,7 @@ def mathml(text: str, block: bool) -> str:
     return LETTER.sub(_letter, made)
 
 
-def on_page_content(content: str, **_: Any) -> str:
+def on_page_content(content: str, page: Page, **_: Any) -> str:
     """Formulas become MathML, which browsers draw themselves; names in docstrings become links."""
 
     def formula(found: re.Match[str]) -> str:
@@ -102,4 +103,8 @@ def on_page_content(content: str, **_: Any) -> str:
     def name(found: re.Match[str]) -> str:
         return f'<autoref identifier="{found[1]}" optional><code>{found[1].rpartition(".")[2]}</code></autoref>'
 
+    headings = list(page.toc)
+    for heading in headings:  # grows
+        heading.title = HEADING.sub(lambda found: mathml(html.unescape(found[1]), False), heading.title)
+        headings += heading.children
     return ROLE.sub(name, FORMULA.sub(formula, content))
