@@ -215,7 +215,7 @@ class HHT:
                 new = self.density.solve(np.maximum(state.W_max, momentum.W), gamma)
                 last, change = change, float(np.abs(new - gamma).max())
                 settled = change <= c.gamma_tolerance
-                growing = growing + 1 if change > 0.98 * last else 0
+                growing = growing + 1 if change > last else 0
                 if self.loading and growing >= 3:
                     return None, iteration
                 gamma = new

@@ -2,8 +2,8 @@
 
 Waves cross the body thousands of times while slow grips load it, so that the explicit scheme would take 10^9 steps. The
 implicit one takes steps as long as the two fields converge in them, and those that do not are halved: first with the
-distance to the limit load, then with the growth of the instability. Where a step has become so short that a shear wave
-no longer crosses the body in two of them, the event begins: state, velocities and accelerations are handed over.
+distance to the limit load, then with the growth of the instability. When the body moves much faster than its grips, the
+event begins: state, velocities and accelerations are handed over.
 """
 
 from __future__ import annotations
@@ -40,13 +40,14 @@ class LoadingFromRest:
     INCREMENT = 0.002    # largest step, as displacement of a grip over the size of the body
     TOLERANCE = 1e-4     # of forces and of gamma: what is left is the kick the event begins with
     ITERATIONS = 200     # the coupling of the fields converges ever more slowly towards the limit load
-    HANDOVER = 0.5       # step at which the event begins, in transits of a shear wave through the body
+    FAST = 100.0         # speed at which the event begins, in speeds of a grip; a body under load has a few
 
     def __init__(self, momentum: Momentum, density: DensitySolver, free: np.ndarray, grip_velocity: np.ndarray,
                  controls: HHTControls, deletion: float = 1e-6, threads: int = 1) -> None:
         size = float(np.ptp(momentum.space.X, axis=0).max())
-        self._last = self.HANDOVER * size / (momentum.material.shear_wave_speed * 1e3)
-        longest = max(self.INCREMENT * size / float(np.abs(grip_velocity).max()), 2 * self._last)
+        self._fast = self.FAST * float(np.abs(grip_velocity).max())
+        longest = max(self.INCREMENT * size / float(np.abs(grip_velocity).max()), 2 * controls.dt)
+        self._last = controls.dt
         self.integrator = HHT(momentum, density, free, grip_velocity, replace(
             controls, coupling="iterated", dt=longest, dt_first=0.0, force_tolerance=self.TOLERANCE,
             correction_tolerance=2 * self.TOLERANCE, gamma_tolerance=self.TOLERANCE, max_iterations=self.ITERATIONS),
@@ -62,6 +63,6 @@ class LoadingFromRest:
         """Load `state` to the onset, yielding it after each step; the last one is the onset."""
         if state.step == 0:
             self.integrator.begin(state)
-        while self.integrator.dt > self._last:
+        while self.integrator.dt > self._last and float(np.abs(state.v).max()) < self._fast:
             self.integrator.step(state)
             yield state
