@@ -26,6 +26,7 @@ __all__ = ["check_mesh", "one_line", "quietly", "read_mesh_file"]
 LARGEST = 2 * 10**9        # bytes of a mesh file
 ROOM = (10**9, 30)         # memory to read one [bytes]: at least this, or this many times its size
 POINTERS = (".xdmf", ".xmf", ".node", ".ele")  # formats that are spread over several files
+CORNERS = {"vertex": 1, "line": 2, "quad": 4, "hexahedron": 8}
 EXTENT = (1e-9, 1e9)       # mm across
 
 
@@ -93,6 +94,8 @@ def check_mesh(name: str, mesh: meshio.Mesh) -> None:
     """
     points, blocks = mesh.points, mesh.cells
     for block in blocks:
+        if np.shape(block.data)[1:] != (CORNERS.get(block.type, np.shape(block.data)[-1]),):
+            raise MeshError(f"mesh {name} has elements ({block.type}) with a number of nodes that is not theirs")
         if not isinstance(block.data, np.ndarray) or block.data.dtype.kind not in "iu" or (
                 block.data.size and not 0 <= block.data.min() <= block.data.max() < len(points)):
             raise MeshError(f"mesh {name} has elements with nodes that do not exist")

@@ -2,17 +2,31 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import skfem
-from plates import SMALL, contents, invoke, plate
+from plates import SMALL, contents, forked, invoke, plate
 
 import skfsink.memory
+import skfsink.run
+from skfsink.checkpoint import load_checkpoint
 from skfsink.memory import LIMIT, available, estimate, factor_entries
 from skfsink.meshing import write_mesh
+from skfsink.momentum import Momentum
+from skfsink.progress import Interrupt
+from skfsink.recorder import Recorder
 from skfsink.run import read_scene
 from skfsink.space import Space
 
@@ -80,3 +94,172 @@ def test_a_large_run_says_what_it_needs(mesh: Path, tmp_path: Path, monkeypatch:
     monkeypatch.setattr(skfsink.memory, "WORTH_SAYING", 0.1)
     status, err, _ = invoke("--mesh", mesh, "--out", tmp_path / "out", "--event-time", "1e-9", *SMALL[:-1])
     assert status == 0 and "the run will need about 0.4 GB of memory; there are" in err
+
+
+# --- signals ---
+def test_a_long_step_is_not_waited_for(mesh: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fails if a signal in a step that goes on for long ends the run late, with a traceback, or with nothing to resume.
+
+    The step stands still in the loading (a factorisation of a large body), from its sixth force on.
+    """
+    monkeypatch.setattr(Interrupt, "PATIENCE", 0.3)
+    out, force, calls = tmp_path / "out", Momentum.force, 0
+
+    def slow(self: Momentum, *arguments: Any, **named: Any) -> np.ndarray:
+        nonlocal calls
+        calls += 1
+        if calls == 6:
+            os.kill(os.getpid(), signal.SIGTERM)
+            for _ in range(200):
+                time.sleep(0.05)
+        return force(self, *arguments, **named)
+
+    monkeypatch.setattr(Momentum, "force", slow)
+    begun = time.monotonic()
+    status, text = forked(["--mesh", mesh, "--out", out, "--event-time", "1e-6", *SMALL])
+    assert (status, text) == (130, f"skfsink: interrupted; go on with skfsink resume {out}\n")
+    assert time.monotonic() - begun < 8
+    monkeypatch.setattr(Momentum, "force", force)
+    assert forked(["--resume", out, "--quiet"]) == (0, "")
+    assert forked(["--mesh", mesh, "--out", tmp_path / "whole", "--event-time", "1e-6", *SMALL]) == (0, "")
+    assert (out / "history.csv").read_bytes() == (tmp_path / "whole/history.csv").read_bytes()
+
+
+@pytest.mark.parametrize("place", ["lay_out", "between"])
+def test_signals_outside_of_the_steps(place: str, mesh: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fails if a signal while a run is set up, or between two analyses, is a traceback or loses the first of them."""
+    out = tmp_path / "out"
+    owner, name = (skfsink.run, "prepare_folder") if place == "lay_out" else (skfsink.run, "load_state")
+    call = getattr(owner, name)
+
+    def hit(*arguments: object) -> object:
+        os.kill(os.getpid(), signal.SIGTERM)
+        return call(*arguments)
+
+    for drawing in ("draw_run", "draw_comparison"):
+        monkeypatch.setattr(skfsink.run, drawing, lambda *_: None)
+    arguments = ["--mesh", mesh, "--out", out, "--analysis", "both", "--event-time", "1e-6", *SMALL]
+    monkeypatch.setattr(owner, name, hit)
+    status, text = forked(arguments)
+    monkeypatch.setattr(owner, name, call)
+    if place == "lay_out":
+        assert (status, text) == (130, "skfsink: interrupted; nothing was computed yet\n")
+        assert forked(arguments)[0] == 0
+    else:
+        assert (status, text) == (130, f"skfsink: interrupted; go on with skfsink resume {out}\n")
+        done = (out / "dynamic/history.csv").read_bytes()
+        assert forked(["--resume", out, "--quiet"])[0] == 0
+        assert (out / "dynamic/history.csv").read_bytes() == done
+    assert (out / "quasistatic/summary.json").is_file()
+
+
+@pytest.mark.parametrize("number", [pytest.param(signal.SIGINT, marks=pytest.mark.slow), signal.SIGTERM])
+def test_programs_that_are_stopped(number: signal.Signals, mesh: Path, tmp_path: Path) -> None:
+    """Fails if `skfsink run` or `skfsink sweep` do not end within seconds of a signal, with what goes on with them."""
+    deck = tmp_path / "deck.toml"
+    deck.write_text('case = "single_edge_notch"\n[parameters]\nmesh = "plate.vtu"\nlength_scale = 0.6\n'
+                    'checkpoint_every = 1000\nevent_time = 1\nintegrator = "hht"\nhht_dt = 1e-9\n')
+    run, sweep = tmp_path / "run", tmp_path / "sweep"
+    for arguments, sign, said in (
+            (["run", deck, "--out", run, "--quiet"], run / "series/run_0000.vtu", f"go on with skfsink resume {run}"),
+            (["sweep", deck, "--vary", "phi=0.16,0.17", "--jobs", "1", "--out", sweep, "--quiet"],
+             sweep / "phi=0.16/run/series/run_0000.vtu", "0 of 2 runs done; the same command goes on")):
+        child = subprocess.Popen([sys.executable, "-m", "skfsink", *map(str, arguments)], stderr=subprocess.PIPE,
+                                 text=True)
+        try:
+            for _ in range(600):
+                if sign.exists() or child.poll() is not None:
+                    break
+                time.sleep(0.1)
+            child.send_signal(number)
+            begun = time.monotonic()
+            err = child.communicate(timeout=30)[1]
+        finally:
+            child.kill()
+        assert (child.returncode, err) == (130, f"skfsink: interrupted{' with' if arguments[0] == 'sweep' else ';'} "
+                                                f"{said}\n")
+        assert time.monotonic() - begun < 15
+        folder = sign.parents[1]
+        scene = read_scene(folder)
+        assert load_checkpoint(folder / "checkpoint.npz", scene.fingerprint)[0].phase == "event"
+
+
+# --- disks ---
+def tight(operation: Any, after: int, number: int) -> Any:
+    """`operation`, failing as the system does from its call number `after` on."""
+    calls = 0
+
+    def wrapper(*arguments: Any, **named: Any) -> Any:
+        nonlocal calls
+        calls += 1
+        if calls > after:
+            raise OSError(number, os.strerror(number))
+        return operation(*arguments, **named)
+    return wrapper
+
+
+@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EROFS])
+@pytest.mark.parametrize("after", [9, 25])
+def test_writing_fails(number: int, after: int, mesh: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fails if a file that cannot be written is a traceback, or costs the checkpoint that was there."""
+    out = tmp_path / "out"
+    arguments = ["--mesh", mesh, "--event-time", "5e-6", "--checkpoint-every", "1e-9", *SMALL]
+    monkeypatch.setattr(skfsink.run, "draw_run", lambda *_: None)
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "fsync", tight(os.fsync, after, number))
+        status, err, _ = invoke(*arguments, "--out", out)
+    assert status == 2 and err.startswith("skfsink: cannot write ") and os.strerror(number) in err
+    assert err.count("\n") == 1 and not [path for path in out.rglob(".*") if path.is_file()]
+    assert forked(["--resume", out, "--quiet"]) == (0, "")
+    assert forked([*arguments, "--out", tmp_path / "whole"]) == (0, "")
+    assert (out / "history.csv").read_bytes() == (tmp_path / "whole/history.csv").read_bytes()
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Path]:
+    """A disk of 1 MB."""
+    path = tmp_path / "disk"
+    path.mkdir()
+    done = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=1m", "tmpfs", str(path)], capture_output=True)
+    if done.returncode:
+        pytest.skip("only root can mount a small disk")
+    try:
+        yield path
+    finally:
+        subprocess.run(["umount", "-l", str(path)], check=True)
+
+
+def test_a_disk_that_is_full(small_disk: Path, mesh: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fails if a real disk without room is a traceback, or costs the last checkpoint."""
+    out = small_disk / "out"
+    monkeypatch.setattr(skfsink.run, "draw_run", lambda *_: None)
+    arguments = ["--mesh", mesh, "--event-time", "2e-5", "--frame-every", "1e-7", "--record-every", "1e-7",
+                 "--checkpoint-every", "0.01", *SMALL]
+    status, err = forked([*arguments, "--out", out])
+    assert status == 2 and err.startswith("skfsink: cannot write ") and "No space left" in err, err
+    shutil.copytree(out, tmp_path / "larger")
+    assert forked(["--resume", tmp_path / "larger", "--quiet"]) == (0, "")
+    assert forked([*arguments, "--out", tmp_path / "whole"]) == (0, "")
+    assert (tmp_path / "larger/history.csv").read_bytes() == (tmp_path / "whole/history.csv").read_bytes()
+
+
+@pytest.mark.parametrize("away", ["series", "."])
+def test_folders_that_vanish(away: str, mesh: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fails if a folder that is moved away in a run is a traceback, is made again, or what was in it is lost."""
+    out, calls, mark = tmp_path / "out", 0, Recorder.watch
+
+    def moved(self: Recorder, *arguments: Any) -> bool:
+        nonlocal calls
+        calls += 1
+        if calls == 20:
+            shutil.move(out / away, tmp_path / "elsewhere")
+        return mark(self, *arguments)
+
+    monkeypatch.setattr(Recorder, "watch", moved)
+    monkeypatch.setattr(skfsink.run, "draw_run", lambda *_: None)
+    status, err = forked(["--mesh", mesh, "--out", out, "--event-time", "2e-5", "--frame-every", "1e-6",
+                          "--checkpoint-every", "0.01", *SMALL])
+    assert status == 2 and err.startswith("skfsink: cannot write ") and "No such file" in err, err
+    monkeypatch.setattr(Recorder, "watch", mark)
+    shutil.move(tmp_path / "elsewhere", out / away)
+    assert forked(["--resume", out, "--quiet"]) == (0, "")
