@@ -43,7 +43,7 @@ METHODS = {
 }
 TOLERANCE, MOST = 1e-8, 100_000   # relative residual, iterations
 H = 0.025                         # size of the elements, l/4 [mm]: a larger system is a larger body
-SECONDS, GIGABYTES = 120.0, 12.0  # what a solution may take, beyond the system itself
+SECONDS, GIGABYTES = 120.0, 12.0  # processor time and memory a solution may take, beyond the system itself
 OVER_TIME, OVER_MEMORY = 3, 4     # exit statuses
 REPEAT = 0.2                      # shorter solutions are repeated to measure their time [s]
 
@@ -232,7 +232,7 @@ SOLVERS: dict[str, Callable[[System], Renew]] = {f.__name__: f for f in (direct,
 
 
 def solve_system(field: str, dim: int, method: str, unknowns: int) -> dict[str, Any]:
-    """Solve a system; times [s], iterations, true relative residual, and memory beyond the system itself [MB].
+    """Solve a system; processor times [s], iterations, true relative residual, memory beyond the system itself [MB].
 
     `once_s` is what is done once for many matrices (analysis, a hierarchy or factors that are kept), `setup_s` what is
     done for every new one, `solve_s` the solution.
@@ -241,9 +241,9 @@ def solve_system(field: str, dim: int, method: str, unknowns: int) -> dict[str, 
     system = density_system(space) if field == "density" else tangent_system(space)
     del space
     with _Watch() as watch:
-        start = time.perf_counter()
+        start = time.thread_time()
         renew = SOLVERS[method](system)
-        once = time.perf_counter() - start
+        once = time.thread_time() - start
         setup, solve = _timed(renew)
         seconds, (x, iterations) = _timed(solve)
     residual = system.matrix(system.data) @ x - system.b
@@ -253,17 +253,17 @@ def solve_system(field: str, dim: int, method: str, unknowns: int) -> dict[str, 
 
 
 def _timed(function: Callable[[], Any]) -> tuple[float, Any]:
-    """Least time of a call [s], of several if it is short, and what it returned."""
+    """Least processor time of a call [s], of several if it is short, and what it returned."""
     times: list[float] = []
     while not times or (sum(times) < REPEAT and len(times) < 20):
-        start = time.perf_counter()
+        start = time.thread_time()
         found = function()
-        times.append(time.perf_counter() - start)
+        times.append(time.thread_time() - start)
     return min(times), found
 
 
 class _Watch:
-    """Follows the memory of this process; ends it when it takes too long or too much."""
+    """Follows the memory of this process; ends it when it works too long or takes too much."""
 
     def __init__(self) -> None:
         self._process = psutil.Process()
@@ -273,7 +273,7 @@ class _Watch:
     def __enter__(self) -> _Watch:
         with suppress(OSError, AttributeError):  # what the system's assembly left behind would be used again unseen
             ctypes.CDLL("libc.so.6").malloc_trim(0)
-        self._first, self._start = self._process.memory_info().rss, time.monotonic()
+        self._first, self._start = self._process.memory_info().rss, time.process_time()
         self._thread = threading.Thread(target=self._follow, daemon=True)
         self._thread.start()
         return self
@@ -282,7 +282,7 @@ class _Watch:
         self.rise = max(self.rise, float(self._process.memory_info().rss - self._first))
         if self.rise > GIGABYTES * 1e9:
             os._exit(OVER_MEMORY)
-        if time.monotonic() - self._start > SECONDS:
+        if time.process_time() - self._start > SECONDS:
             os._exit(OVER_TIME)
 
     def _follow(self) -> None:
