@@ -88,6 +88,12 @@ class Series:
             pending, self._pending = self._pending, None
             pending.result()
 
+    def close(self) -> None:
+        """Wait for the frame that is being written, if any, whatever becomes of it: the run has ended otherwise."""
+        if self._pending is not None:
+            self._pending.exception()
+            self._pending = None
+
     def _write(self, path: Path, mesh: meshio.Mesh) -> None:
         with replaced(path) as part:
             meshio.write(part, mesh, "vtu", compression="zlib")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import time
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -80,7 +81,7 @@ class Simulation:
     # --- the phases ---
     def run(self, onset: State | None = None) -> State:
         """Run to the end from where the state is; `onset` is a state already loaded to the onset."""
-        with Interrupt() as interrupt, self.notes, one_thread_of_openblas():
+        with Interrupt() as interrupt, self.notes, one_thread_of_openblas(), closing(self.recorder.series):
             self._interrupt = interrupt
             if self.state.phase == "loading":
                 self.recorder.guard.check_scene()
