@@ -27,12 +27,15 @@ TOLERANCE = 0.05
 
 def draw_ladders(ladders: Mapping[str, Ladder], path: Path, quantity: str = "U") -> None:
     """Draw the error of `quantity` against the price, a panel a scene."""
-    title = f"Models of the six scenes: error of ${quantity}$ at the first arrival against price"
+    title = f"Models of the scenes: error of ${quantity}$ at the first arrival against price"
     with page(path, title, 3, 2, 8.6) as axes:
         for ax, case in zip(axes, LADDERS):
             ax.set_title(case.replace("_", " "))
             if case in ladders:
                 _panel(ax, ladders[case], quantity)
+            else:
+                ax.set_axis_off()
+                ax.text(0.5, 0.5, "not measured", transform=ax.transAxes, ha="center", color="0.5")
         keys: list[Artist] = [Line2D([], [], marker=MARKERS[base], color=COLOURS[base], markersize=4, linestyle="",
                                      label=words) for base, words in WORDS.items()]
         keys += [Line2D([], [], color="0.4", linewidth=0.8, linestyle="--", label=f"tolerance {TOLERANCE:g}"),
