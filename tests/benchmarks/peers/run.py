@@ -51,7 +51,8 @@ PEERS = {
     "torchfem": "torch-fem",
     "easyfea": "EasyFEA",
 }
-ONLY = {"sfepy": ("slab",)}  # peers that cannot state every problem
+#: peers that cannot state every problem, or take a quarter of an hour for it
+ONLY = {"sfepy": ("slab",), "skfem:one-form": ("plate",)}
 SINGLE = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
 
 
