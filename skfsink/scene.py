@@ -19,8 +19,10 @@ from .errors import OutputError, ParameterError, require
 from .explicit import ExplicitControls
 from .halving import Whole
 from .hht import HHTControls
+from .loads import Grip, Traction
 from .material import Material, SinkLaw
 from .momentum import ELEMENTS, check_element
+from .regions import Region
 from .sample import Sample
 from .statics import StaticsControls
 
@@ -37,14 +39,6 @@ def choose(name: str, value: str, allowed: tuple[str, ...]) -> str:
     if value not in allowed:
         raise ParameterError(f"{name} must be one of {', '.join(allowed)}; got {value!r}")
     return value
-
-
-@dataclass(frozen=True)
-class Grip:
-    """A boundary that moves as given: velocity [mm/s] by component, None where it is free."""
-
-    boundary: str
-    velocity: tuple[float | None, ...]
 
 
 @dataclass(frozen=True)
@@ -132,6 +126,8 @@ class Scene:
     parameters: the arguments of the case function, enough to make this scene again.
     sample, material, sink_law: what is computed.
     grips: the first one's reaction is the load that is reported, in the direction of its velocity.
+    tractions: dead loads.
+    regions: elements of other materials than `material`; no element is in two.
     faces: in three dimensions, the surfaces of a sheet along which a crack runs; they are no edges it arrives at.
     view: azimuth and elevation [degrees] from which pictures show a body in space.
     rollers: boundaries held on planes of symmetry or between faces; they are no grips.
@@ -156,6 +152,8 @@ class Scene:
     material: Material
     sink_law: SinkLaw
     grips: tuple[Grip, ...]
+    tractions: tuple[Traction, ...] = ()
+    regions: tuple[Region, ...] = ()
     faces: tuple[str, ...] = ()
     view: tuple[float, float] = (-75.0, 60.0)
     rollers: tuple[Grip, ...] = ()
@@ -166,8 +164,8 @@ class Scene:
     choice: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for grip in (*self.grips, *self.rollers):
-            self.sample.nodes(grip.boundary)
+        for boundary in (load.boundary for group in (self.grips, self.rollers, self.tractions) for load in group):
+            self.sample.nodes(boundary)
         check_element(self.controls.element, self.sample.space)
 
     def part(self, analysis: str) -> Scene:
