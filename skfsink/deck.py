@@ -7,6 +7,8 @@
     notch = 1.5                  # a plain number: N, mm, MPa, s; density in kg/m^3
     density = "1433 kg/m^3"
     mesh = "coarse"              # or a mesh file, sought from the deck's folder
+
+A `custom` scene also has tables [[grips]], [[tractions]] and [[regions]] (see :mod:`.tables`).
 """
 
 from __future__ import annotations
@@ -24,6 +26,7 @@ from . import cases
 from .errors import OutputError, ParameterError
 from .options import Options
 from .result import Result
+from .tables import TABLES, joined, read_tables
 from .units import UNITS, in_unit
 
 __all__ = ["CASES", "Deck", "case_function", "parameters_of", "read_deck", "read_value", "stored_case"]
@@ -93,14 +96,17 @@ def read_deck(path: Path) -> Deck:
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise ParameterError(f"{path} is no deck: {reason}") from None
-    if unknown := [key for key in data if key not in TOP]:
-        raise ParameterError(f"{path}: {unknown[0]!r} is none of {', '.join(TOP)}")
-    case, parameters = data.get("case"), data.get("parameters", {})
+    case, parameters = data.get("case"), data.setdefault("parameters", {})
+    top = (*TOP, *TABLES) if case == "custom" else TOP
+    if unknown := [key for key in data if key not in top]:
+        raise ParameterError(f"{path}: {unknown[0]!r} is none of {', '.join(top)}")
     if not isinstance(case, str) or not isinstance(parameters, dict):
         raise ParameterError(f"{path}: case must be a name, one of {', '.join(CASES)}, and parameters a table")
     try:
         known = parameters_of(case)
-        read = {name: read_value(name, value, known) for name, value in parameters.items()}
+        if twice := parameters.keys() & TABLES.keys():
+            raise ParameterError(f"{min(twice)} are tables beside the parameters: [[{min(twice)}]]")
+        read = {name: read_value(name, value, known) for name, value in joined(data, case == "custom").items()}
     except ParameterError as error:
         raise ParameterError(f"{path}: {error}") from None
     if "mesh" in read and Path(read["mesh"]).suffix:
@@ -139,6 +145,8 @@ def read_value(name: str, value: Any, known: Mapping[str, Any]) -> Any:
     if name not in known:
         raise ParameterError(f"{name!r} is no parameter; `skfsink show CASE` lists them")
     default = known[name]
+    if name in TABLES:
+        return read_tables(name, value)
     if isinstance(default, bool):
         if not isinstance(value, bool):
             raise ParameterError(f"{name} must be true or false; got {value!r}")

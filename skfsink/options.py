@@ -12,7 +12,7 @@ from cyclopts import Group, Parameter, Token
 from .errors import ParameterError, require
 from .explicit import ExplicitControls
 from .hht import HHTControls
-from .material import AAA, SinkLaw
+from .material import AAA, LIMITERS, Material, SinkLaw, material_of
 from .scene import Controls, choose
 from .statics import StaticsControls
 
@@ -71,16 +71,21 @@ class Options:
         path of a first pass on elements twice as large; needs gmsh, or is "corridor").
     active_zone
         Explicit steps solve for γ only where it changes.
+    material
+        Law of the stored energy: "aaa" (the paper's), "neo-hookean", "yeoh", "mooney-rivlin", "gent", "arruda-boyce"
+        or "hgo"; `skfsink material NAME` shows one.
     c1
-        First constant of the stored energy [MPa], > 0.
+        First constant of aaa [MPa], > 0.
     c2
-        Second constant of the stored energy [MPa], >= 0.
+        Second constant of aaa [MPa], >= 0.
+    constants
+        Constants of another law than aaa, as "mu = 0.27 MPa, limit = 76.5"; those left out have their defaults.
     bulk_modulus
         Bulk modulus k [MPa], > 0.
     density
         Density of the intact material ρ0 [kg/m^3], > 0.
     phi
-        Energy limiter Φ [MPa], > 0.
+        Energy limiter Φ [MPa], > 0; 0 takes the one that belongs to the law's default constants (aaa: 0.1686).
     m
         Sharpness of the energy limiter, >= 1.
     length_scale
@@ -154,11 +159,13 @@ class Options:
     dimensions: Annotated[int, MODEL] = 0
     mesh_layout: Annotated[str, MODEL] = "corridor"
     active_zone: Annotated[bool, MODEL_FLAG] = True
+    material: Annotated[str, MATERIAL] = "aaa"
     c1: Annotated[float, MATERIAL] = 0.617
     c2: Annotated[float, MATERIAL] = 1.215
+    constants: Annotated[str, MATERIAL] = ""
     bulk_modulus: Annotated[float, MATERIAL] = 500.0
     density: Annotated[float, MATERIAL] = 1433.0
-    phi: Annotated[float, SINK] = 0.1686
+    phi: Annotated[float, SINK] = 0.0
     m: Annotated[float, SINK, Parameter(name=["--m"])] = 10.0
     length_scale: Annotated[float, SINK] = 0.1
     sink: Annotated[str, SINK] = "lumped"
@@ -201,15 +208,24 @@ class Options:
                 raise ParameterError(f"{name.replace('_', '-')} must be true or false; got {getattr(self, name)!r}")
         if self.dimensions not in (0, 2, 3):
             raise ParameterError(f"dimensions must be 2, 3, or 0 for those of the sample; got {self.dimensions!r}")
-        self.material(), self.sink_law(), self.controls()
+        self.stored_energy(), self.sink_law(), self.controls()
 
-    def material(self) -> AAA:
-        """The stored energy."""
-        return AAA(self.bulk_modulus, self.density, self.c1, self.c2)
+    def stored_energy(self) -> Material:
+        """The material."""
+        if self.material == "aaa":
+            if self.constants:
+                raise ParameterError(f"constants are those of another law than aaa, whose are c1 and c2; "
+                                     f"got {self.constants!r}")
+            return AAA(self.bulk_modulus, self.density, self.c1, self.c2)
+        for name in ("c1", "c2"):
+            if getattr(self, name) != getattr(Options, name):
+                raise ParameterError(f"{name} is a constant of aaa; those of {self.material} go into constants; "
+                                     f"got {getattr(self, name)!r}")
+        return material_of(self.material, self.constants, self.bulk_modulus, self.density)
 
     def sink_law(self) -> SinkLaw:
         """The sink and flux laws."""
-        return SinkLaw(self.phi, self.m, self.length_scale)
+        return SinkLaw(LIMITERS[self.material].phi if self.phi == 0 else self.phi, self.m, self.length_scale)
 
     def controls(self) -> Controls:
         """How to compute."""
@@ -223,5 +239,6 @@ class Options:
             StaticsControls(front=self.front))
 
     def parameters(self) -> dict[str, Any]:
-        """The options that decide results, by name."""
-        return {f.name: getattr(self, f.name) for f in fields(self) if f.name not in NOT_PHYSICS}
+        """The options that decide results, by name; the energy limiter is that of the law where it was 0."""
+        chosen = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in NOT_PHYSICS}
+        return {**chosen, "phi": self.sink_law().phi}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +19,9 @@ from .meshing import read_mesh
 from .shapes import SHAPES
 from .space import Space
 
-__all__ = ["Sample", "data_folder", "load_sample", "shape_mesh", "shape_sample"]
+__all__ = ["Sample", "data_folder", "file_sample", "load_sample", "shape_mesh", "shape_sample"]
 
+SIDE = 1e-6  # distance from the end of a body, over its size, within which a node is on that side
 _CELLS = {"quad": (skfem.MeshQuad, "line"), "hexahedron": (skfem.MeshHex, "quad")}
 
 
@@ -33,6 +34,7 @@ class Sample:
     name: of the mesh.
     space: spaces on it.
     boundaries: nodes of each named boundary, ascending.
+    cells: numbers of the elements of each named set, ascending.
     made: whether the mesh was made by gmsh, and is not a file of the user's or a committed one.
     """
 
@@ -40,6 +42,7 @@ class Sample:
     space: Space
     boundaries: Mapping[str, np.ndarray]
     made: bool = False
+    cells: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     def nodes(self, boundary: str) -> np.ndarray:
         """Nodes of a named boundary.
@@ -53,6 +56,19 @@ class Sample:
             raise MeshError(f"mesh {self.name} has no boundary {boundary!r}; it has "
                             f"{one_line(', '.join(sorted(self.boundaries))) or 'none'}")
         return self.boundaries[boundary]
+
+    def elements(self, name: str) -> np.ndarray:
+        """Elements of a named set.
+
+        Raises
+        ------
+        MeshError
+            The mesh has no such set.
+        """
+        if name not in self.cells:
+            raise MeshError(f"mesh {self.name} has no set of elements {name!r}; it has "
+                            f"{one_line(', '.join(sorted(self.cells))) or 'none'}")
+        return self.cells[name]
 
     def rim(self, *faces: str) -> np.ndarray:
         """Nodes of the outer boundary without the named `faces`, but with the edges of these."""
@@ -96,6 +112,27 @@ def load_sample(case: str, mesh: str, make: Callable[[], meshio.Mesh] | None = N
     if not Path(mesh).suffix:
         raise MeshError(f"mesh must be one of {', '.join(known)}, or the path of a mesh file; got {mesh!r}")
     return _from_meshio(mesh, read_mesh_file(Path(mesh)))
+
+
+def file_sample(path: Path) -> Sample:
+    """The sample in a mesh file, whose sides have names.
+
+    A boundary that the mesh does not name itself may be called `left` or `right` (nodes of least and greatest x),
+    `bottom` or `top` (y), `back` or `front` (z).
+
+    Raises
+    ------
+    MeshError
+        As of :func:`load_sample`.
+    """
+    sample = _from_meshio(str(path), read_mesh_file(path))
+    X = sample.space.X
+    near = SIDE * float(np.ptp(X, axis=0).max())
+    sides = {}
+    for x, names in zip(X.T, (("left", "right"), ("bottom", "top"), ("back", "front"))):
+        for name, end in zip(names, (x.min(), x.max())):
+            sides[name] = np.flatnonzero(np.abs(x - end) <= near)
+    return replace(sample, boundaries={**sides, **sample.boundaries})
 
 
 def shape_sample(case: str, own: Mapping[str, Any], lift: Callable[[meshio.Mesh], meshio.Mesh] | None = None,
@@ -164,11 +201,23 @@ def _from_meshio(name: str, data: meshio.Mesh, made: bool = False) -> Sample:
         space = Space(mesh_class(np.ascontiguousarray(points.T), np.ascontiguousarray(connectivity.astype(np.int64))))
     except MeshError as error:
         raise MeshError(f"mesh {shown}: {error}") from None
-    return Sample(Path(name).stem, space, _boundaries(data, facet), made)
+    return Sample(Path(name).stem, space, _boundaries(data, facet), made, _elements(data, kind))
+
+
+def _elements(data: meshio.Mesh, kind: str) -> dict[str, np.ndarray]:
+    """Sets of elements, by the number of the element in the mesh."""
+    sets, first = {}, np.cumsum([0, *(len(block.data) * (block.type == kind) for block in data.cells)])
+    for name, members in data.cell_sets.items():
+        found = [at + np.asarray(index, int) for block, at, index in zip(data.cells, first, members)
+                 if block.type == kind and index is not None and len(index)]
+        if found and not name.startswith("gmsh:"):
+            sets[name] = np.unique(np.concatenate(found))
+    return sets
 
 
 def _boundaries(data: meshio.Mesh, facet: str) -> dict[str, np.ndarray]:
-    sets: dict[str, Any] = {}
+    sets: dict[str, Any] = {name: np.unique(np.asarray(nodes, np.int64)) for name, nodes in data.point_sets.items()
+                            if len(nodes)}
     for name, members in data.cell_sets.items():
         if name.startswith("gmsh:"):
             continue

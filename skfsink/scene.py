@@ -25,6 +25,7 @@ from .momentum import ELEMENTS, check_element
 from .regions import Region
 from .sample import Sample
 from .statics import StaticsControls
+from .tables import joined, split
 
 __all__ = ["ANALYSES", "INTEGRATORS", "STARTS", "Controls", "Grip", "Scene", "choose", "read_choice",
            "read_parameters"]
@@ -193,13 +194,11 @@ class Scene:
 
     def toml(self) -> str:
         """Text of `scene.toml`."""
-        head = (f"# A run of skfsink. Run it again with: python -m skfsink.cases.{self.case} "
-                "and the parameters below.\n"
+        head = ("# A run of skfsink. Run it again with: skfsink run scene.toml\n"
                 "# Plain numbers are in N, mm, MPa and s; density in kg/m^3.\n")
         parameters = {k: v.item() if isinstance(v, np.generic) else v for k, v in self.parameters.items()}
         choice = {"choice": dict(self.choice)} if self.choice else {}
-        return head + tomli_w.dumps({"case": self.case, "parameters": parameters, "assumed": list(self.assumed),
-                                     **choice})
+        return head + tomli_w.dumps({"case": self.case, **split(parameters), "assumed": list(self.assumed), **choice})
 
     @property
     def fingerprint(self) -> str:
@@ -224,7 +223,7 @@ def read_parameters(folder: Path, case: str) -> dict[str, Any]:
         raise OutputError(f"{folder} holds no run to resume: there is no {path}")
     try:
         data = tomllib.loads(path.read_text())
-        found, parameters = str(data["case"]), dict(data["parameters"])
+        found, parameters = str(data["case"]), joined(data, case == "custom")
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, KeyError, TypeError, ValueError) as error:
         raise OutputError(f"{path} is not the scene of a run: {error}") from None
     if found != case:

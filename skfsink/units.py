@@ -32,8 +32,10 @@ def _registry() -> Any:
     return pint.UnitRegistry(cache_folder=None)
 
 
-def in_unit(name: str, text: str, unit: str) -> float:
+def in_unit(name: str, text: str, unit: str, plain: bool = False) -> float:
     """The quantity `text`, such as "5 mm", as a number in `unit` ("" for a pure number).
+
+    With `plain` a number without a unit is one in `unit`.
 
     Raises
     ------
@@ -45,7 +47,10 @@ def in_unit(name: str, text: str, unit: str) -> float:
     try:
         if parts is None:
             raise ValueError
-        return float(parts["number"]) * _factor(parts["unit"], unit)
+        number = float(parts["number"])
+        if parts["unit"] == unit or (plain and not parts["unit"]):
+            return number
+        return float(f"{number * _factor(parts['unit'], unit):.15g}")  # 5 µs are 5e-6 s, without a trace of the product
     except ValueError as error:
         raise ParameterError(f"{name} must be {wanted}, such as {_example(unit)}; got {text[:LONGEST]!r}"
                              + (f" ({error})" if str(error) else "")) from None

@@ -74,7 +74,7 @@ def _scene(own: dict[str, Any], options: Options) -> Scene:
     speed = options.speed
     return Scene(
         case="cylindrical_shell", title="Cylindrical shell", parameters={**own, **options.parameters()},
-        material=options.material(), sink_law=options.sink_law(), controls=options.controls(), assumed=ASSUMED,
+        material=options.stored_energy(), sink_law=options.sink_law(), controls=options.controls(), assumed=ASSUMED,
         view=(80.0, 25.0), flat=unrolled(radius, thickness),
         **arrange("cylindrical_shell", own, options,
                   (Grip("top", (0.0, 0.0, speed)), Grip("bottom", (0.0, 0.0, -speed))), faces=("back", "front"),

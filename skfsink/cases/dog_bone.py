@@ -79,7 +79,7 @@ def _scene(own: dict[str, Any], options: Options) -> Scene:
     speed, plane = options.speed, options.element == "planestress"
     along, back = ((0.0, v) if plane else (0.0, v, 0.0) for v in (speed, -speed))
     return Scene(
-        case="dog_bone", title="Dog-bone", parameters={**own, **options.parameters()}, material=options.material(),
+        case="dog_bone", title="Dog-bone", parameters={**own, **options.parameters()}, material=options.stored_energy(),
         sink_law=options.sink_law(), controls=options.controls(), assumed=ASSUMED, view=(-90.0, 70.0),
         **arrange("dog_bone", own, options, (Grip("top", along), Grip("bottom", back)),
                   lift=None if plane else lambda section: swept(section, own["thickness"], own["layers"]),

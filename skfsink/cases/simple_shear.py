@@ -64,7 +64,7 @@ def _scene(own: dict[str, Any], options: Options) -> Scene:
     height = None if choose("top", own["top"], ("free", "held")) == "free" else 0.0
     return Scene(
         case="simple_shear", title="Simple shear", parameters={**own, **options.parameters()},
-        material=options.material(), sink_law=options.sink_law(), controls=options.controls(), assumed=ASSUMED,
+        material=options.stored_energy(), sink_law=options.sink_law(), controls=options.controls(), assumed=ASSUMED,
         **arrange("simple_shear", own, options, (Grip("top", (options.speed, height)), Grip("bottom", (0.0, 0.0))),
                   asymmetry="its halves are stretched and compressed"))
 

@@ -60,7 +60,7 @@ def _scene(own: dict[str, Any], options: Options) -> Scene:
     speed = options.speed
     return Scene(
         case="single_edge_notch", title="Single-edge notched plate", parameters={**own, **options.parameters()},
-        material=options.material(), sink_law=options.sink_law(), controls=options.controls(), assumed=ASSUMED,
+        material=options.stored_energy(), sink_law=options.sink_law(), controls=options.controls(), assumed=ASSUMED,
         **arrange("single_edge_notch", own, options, (Grip("top", (0.0, speed)), Grip("bottom", (0.0, -speed))),
                   mirrors=(Mirror(1, own["side"] / 2, along=True),)))
 

@@ -63,7 +63,7 @@ def _scene(own: dict[str, Any], options: Options) -> Scene:
     speed = options.speed
     return Scene(
         case="symmetric_double_edge_notch", title="Symmetric double-edge notched plate",
-        parameters={**own, **options.parameters()}, material=options.material(), sink_law=options.sink_law(),
+        parameters={**own, **options.parameters()}, material=options.stored_energy(), sink_law=options.sink_law(),
         controls=options.controls(), assumed=ASSUMED,
         **arrange("symmetric_double_edge_notch", own, options,
                   (Grip("top", (0.0, speed)), Grip("bottom", (0.0, -speed))), mirrors=(Mirror(0, own["side"] / 2),)))

@@ -19,6 +19,7 @@ def list_cases() -> None:
     table.add_column("what it is")
     table.add_column("meshes")
     for case in CASES:
-        meshes = sorted(path.stem for path in (data_folder(case) / "meshes").glob("*.vtu"))
+        meshes = ["a mesh file"] if case == "custom" else sorted(
+            path.stem for path in (data_folder(case) / "meshes").glob("*.vtu"))
         table.add_row(case, parse(case_function(case).__doc__ or "").short_description, ", ".join(meshes))
     Console().print(table)

@@ -11,6 +11,15 @@ from docstring_parser import parse
 __all__ = ["deck_text", "show"]
 
 WIDTH = 100
+#: tables of a custom scene
+EXAMPLES = {
+    "grips": ('[[grips]]', 'boundary = "bottom"', 'x = 0', 'y = 0', '[[grips]]', 'boundary = "top"', 'x = 0',
+              'y = "1e-3 mm/s"', '[[grips]]', 'boundary = "right"',
+              'x = [["0 s", "0 mm"], ["10 s", "0.5 mm"]]     # then it stays'),
+    "tractions": ('[[tractions]]', 'boundary = "left"', 'x = "-1 kPa/s"'),
+    "regions": ('[[regions]]', 'name = "inclusion"', 'material = "neo-hookean"', 'constants = "mu = 2 MPa"',
+                'phi = "1 MPa"          # also m, bulk_modulus, density'),
+}
 
 
 def show(case: str) -> None:
@@ -32,6 +41,7 @@ def deck_text(case: str) -> str:
 def _lines(case: str) -> Iterator[str]:
     from ..deck import case_function, parameters_of
     from ..options import Options
+    from ..tables import TABLES
     from ..units import UNITS
 
     function = case_function(case)
@@ -42,9 +52,13 @@ def _lines(case: str) -> Iterator[str]:
     yield f'case = "{case}"'
     yield ""
     yield "[parameters]"
-    for name, default in parameters_of(case).items():
+    parameters = parameters_of(case)
+    for name, default in sorted(parameters.items(), key=lambda item: item[0] in TABLES):  # tables come last
         yield ""
         yield from _comment(meaning[name])
+        if name in TABLES:
+            yield from (f"# {line}" for line in EXAMPLES[name])
+            continue
         unit = UNITS.get(name)
         yield f"{name} = " + json.dumps(f"{default!r} {unit}" if unit else default)
 

@@ -15,6 +15,7 @@ from ..errors import OutputError, require
 from ..files import reported, write_atomic
 from ..progress import Display
 from ..simulate import Interrupted
+from ..tables import split
 from .engine import here, on_scheduler
 from .one import DECK, FAILURE, finished
 from .table import draw, read_rows, write_csv, write_parquet
@@ -78,7 +79,7 @@ def _lay_out(deck: Deck, varied: Sequence[Mapping[str, Any]], folders: Sequence[
     for values in varied:
         whole = replace(deck, parameters={**deck.parameters, **values})
         whole.check()
-        texts.append(tomli_w.dumps({"case": whole.case, "parameters": dict(whole.parameters)}))
+        texts.append(tomli_w.dumps({"case": whole.case, **split(whole.parameters)}))
     for folder, text in zip(folders, texts):
         present = folder / DECK
         if present.is_file() and present.read_text(encoding="utf-8") != text:

@@ -31,7 +31,7 @@ def read_variation(text: str, known: Mapping[str, Any]) -> tuple[str, list[Any]]
     name = name.strip().replace(".", "_").replace("-", "_")
     if not equals or not values.strip():
         raise ParameterError(f"--vary takes NAME=A..B:N, NAME=A..B or NAME=A,B,C; got {text!r}")
-    if name not in known:
+    if name not in known or isinstance(known[name], tuple):
         raise ParameterError(f"--vary {name}: there is no such parameter; `skfsink show CASE` lists them")
     if ".." not in values:
         return name, [_value(name, part.strip(), known) for part in values.split(",")]

@@ -1,0 +1,97 @@
+"""A scene of one's own: any mesh, held, moved and pulled at its named boundaries, of one or several materials."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+from cyclopts import Parameter
+
+from ..errors import ParameterError
+from ..loads import Grip, Traction
+from ..options import SAMPLE, Options
+from ..regions import Region
+from ..result import Result
+from ..run import run_case
+from ..sample import file_sample
+from ..scene import Scene
+from ..tables import TABLES, RegionLaw, grip_from, grips_of, read_tables, region_from, traction_from, tractions_of
+
+__all__ = ["custom"]
+
+IN_A_DECK = Parameter(parse=False)
+
+
+def custom(*, mesh: Annotated[str, SAMPLE] = "", title: Annotated[str, SAMPLE] = "Custom scene",
+           faces: Annotated[str, SAMPLE] = "", grips: Annotated[Sequence[Grip | Mapping[str, Any]], IN_A_DECK] = (),
+           tractions: Annotated[Sequence[Traction | Mapping[str, Any]], IN_A_DECK] = (),
+           regions: Annotated[Sequence[RegionLaw | Mapping[str, Any]], IN_A_DECK] = (),
+           options: Options = Options()) -> Result:  # noqa: B008
+    """Load a body of one's own until it fails, and watch the crack.
+
+    The body is the mesh; named boundaries of it are grips, or carry tractions. Boundaries that the mesh does not name
+    may be called "left", "right" (least and greatest x), "bottom", "top" (y), "back" and "front" (z). It is loaded
+    statically to the onset of failure; the crack then runs dynamically or quasi-statically.
+
+    Parameters
+    ----------
+    mesh
+        Path of a mesh file of quadrilaterals or hexahedra, in mm: gmsh, Abaqus .inp, VTU or what else meshio reads.
+    title
+        For pictures and reports.
+    faces
+        Of a sheet in three dimensions: names of the boundaries along which cracks run, with commas; they are no
+        edges a crack arrives at.
+    grips
+        Boundaries that are held or moved: for x, y, z a velocity, or a ramp of points [time, displacement]; a
+        component left out is free. The load is the force on the first one that moves.
+    tractions
+        Dead loads on boundaries, per undeformed area: for x, y, z a rate, or a ramp of points [time, traction].
+    regions
+        Named sets of elements that are of another material, or of another strength.
+    options
+        Material, analysis and controls; see :class:`~skfsink.options.Options`. `speed` is for the other cases.
+
+    Returns
+    -------
+    Result
+        Summary, history and last state; its files are in the output folder.
+    """
+    if options.model:
+        raise ParameterError(f"model is for the cases of the paper, whose models were measured; got {options.model!r}")
+    given = {"grips": grips, "tractions": tractions, "regions": regions}
+    tables = {name: read_tables(name, [item if isinstance(item, Mapping) else TABLES[name][1](item) for item in items])
+              for name, items in given.items()}
+    own = {"mesh": str(mesh), "title": title, "faces": faces, **tables}
+    return run_case(custom, _scene, own, options)
+
+
+def _scene(own: dict[str, Any], options: Options) -> Scene:
+    if not Path(own["mesh"]).suffix:
+        raise ParameterError(f"mesh must be the path of a mesh file; got {own['mesh']!r}")
+    if not own["grips"] and not own["tractions"]:
+        raise ParameterError("grips: a scene needs at least one grip or traction; a deck has them as [[grips]]")
+    if options.speed != Options().speed:
+        raise ParameterError(f"speed is for the cases of the paper; a grip of a custom scene has its own velocity; "
+                             f"got {options.speed:g}")
+    for name in ("half", "dimensions", "mesh_layout"):
+        if getattr(options, name) != getattr(Options, name):
+            raise ParameterError(f"{name} is for the cases of the paper; the mesh file {own['mesh']} is as it is")
+    sample = file_sample(Path(own["mesh"]))
+    material, sink_law = options.stored_energy(), options.sink_law()
+    laws = [region_from(table) for table in own["regions"]]
+    regions = tuple(Region(law.name, sample.elements(law.name), *law.laws(material, sink_law)) for law in laws)
+    dim = sample.space.dim
+    return Scene(
+        case="custom", title=own["title"], parameters={**own, **options.parameters()}, sample=sample,
+        material=material, sink_law=sink_law, controls=options.controls(), regions=regions,
+        grips=grips_of([grip_from(table) for table in own["grips"]], dim),
+        tractions=tractions_of([traction_from(table) for table in own["tractions"]], dim),
+        faces=tuple(filter(None, (name.strip() for name in own["faces"].split(",")))))
+
+
+if __name__ == "__main__":
+    from ..cli import command
+
+    command(custom)

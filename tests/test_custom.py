@@ -1,0 +1,220 @@
+"""Scenes of one's own: decks with tables, mesh files with named boundaries and regions, and the same from Python."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import meshio
+import numpy as np
+import pytest
+from plates import contents, invoke_program, plate
+
+import skfsink.run
+from skfsink.cases.custom import _scene, custom
+from skfsink.deck import read_deck
+from skfsink.errors import MeshError, ParameterError
+from skfsink.loads import Grip, Ramp, Traction
+from skfsink.material import LIMITERS, MATERIALS, Gent, HolzapfelGasserOgden, constants_text, read_constants
+from skfsink.meshing import write_mesh
+from skfsink.options import Options
+from skfsink.sample import file_sample
+from skfsink.tables import RegionLaw, grip_from, joined, read_tables, split
+
+HEAD = 'case = "custom"\n[parameters]\nmesh = "plate.vtu"\nlength_scale = 0.6\nevent_time = "5 µs"\n'
+GRIPS = '[[grips]]\nboundary = "top"\nx = 0\ny = "1 µm/s"\n[[grips]]\nboundary = "bottom"\nx = 0\ny = -1e-3\n'
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with the mesh of the small plate, from which runs draw nothing."""
+    write_mesh(tmp_path / "plate.vtu", plate())
+    monkeypatch.setattr(skfsink.run, "draw_run", lambda *_: None)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def deck(folder: Path, text: str) -> Path:
+    """File of a deck."""
+    (folder / "deck.toml").write_text(text, encoding="utf-8")
+    return folder / "deck.toml"
+
+
+def test_a_deck_its_scene_file_and_python_give_the_same_run(folder: Path) -> None:
+    """Fails if one of the three ways to the same scene gives another result, or a resumed run refuses its own."""
+    assert invoke_program("run", deck(folder, HEAD + GRIPS), "--out", "first", "--quiet") == (0, "", "")
+    assert invoke_program("run", folder / "first" / "scene.toml", "--out", "second", "--quiet")[0] == 0
+    grips = [Grip("top", (0.0, 1e-3)), Grip("bottom", (0.0, -1e-3))]
+    options = Options(length_scale=0.6, event_time=5e-6, out=Path("third"), quiet=True)
+    result = custom(mesh="plate.vtu", grips=grips, options=options)
+    for name in ("history.csv", "scene.toml", "series/run.pvd"):
+        first = (folder / "first" / name).read_bytes()
+        assert (folder / "second" / name).read_bytes() == first == (result.folder / name).read_bytes(), name
+    before = contents(folder / "first" / "series")
+    assert invoke_program("resume", "first", "--quiet")[0] == 0
+    assert contents(folder / "first" / "series") == before
+
+
+def test_custom_plate_is_the_case_of_the_same_plate(folder: Path) -> None:
+    """Fails if a scene of one's own is computed otherwise than the same scene of a case."""
+    case = 'case = "single_edge_notch"\n' + HEAD.partition("\n")[2]
+    assert invoke_program("run", deck(folder, HEAD + GRIPS), "--out", "own", "--quiet")[0] == 0
+    assert invoke_program("run", deck(folder, case), "--out", "case", "--quiet")[0] == 0
+    assert (folder / "own" / "history.csv").read_bytes() == (folder / "case" / "history.csv").read_bytes()
+
+
+def test_material_of_a_deck(folder: Path) -> None:
+    """Fails if a law chosen in a deck, its constants or the limiter that belongs to it do not reach the scene."""
+    text = HEAD + 'material = "gent"\nconstants = "mu = 300 kPa, limit = 80"\n' + GRIPS
+    own, options = read_deck(deck(folder, text)).check()
+    scene = _scene({"title": "", "faces": "", "tractions": (), "regions": (), **own}, options)
+    assert scene.material == Gent(500.0, 1433.0, 0.3, 80.0)
+    assert scene.sink_law.phi == LIMITERS["gent"].phi == scene.parameters["phi"]
+    assert Options(material="gent", phi=0.5).sink_law().phi == 0.5
+    assert Options().parameters()["phi"] == 0.1686
+
+
+@pytest.mark.parametrize("law", MATERIALS)
+def test_constants_as_text(law: str) -> None:
+    """Fails if the constants of a law do not survive being written and read."""
+    material = MATERIALS[law]()
+    assert MATERIALS[law](**read_constants(law, constants_text(material))) == material
+
+
+def test_constants_with_units_and_vectors() -> None:
+    """Fails if units or the components of a vector are misread."""
+    found = read_constants("hgo", "c = 7.64 kPa, angle = 0.5 radian, axis = 0 1 0, kappa=.1")
+    assert found["c"] == pytest.approx(0.00764) and found["axis"] == (0.0, 1.0, 0.0) and found["kappa"] == 0.1
+    assert found["angle"] == pytest.approx(np.degrees(0.5))
+    assert HolzapfelGasserOgden(**found).axis == (0.0, 1.0, 0.0)
+
+
+@pytest.mark.parametrize(("law", "text", "said"), [
+    ("gent", "mu", "name = value pairs between commas, of mu, limit for gent"), ("gent", "nu = 1", "got 'nu = 1'"),
+    ("gent", "mu = 1 mm", "mu must be a quantity in MPa"), ("gent", "mu = 1, mu = 2", "mu is there twice"),
+    ("gent", "bulk_modulus = 5", "of mu, limit"), ("yeoh", "c1 = x", "c1 must be")])
+def test_what_are_no_constants(law: str, text: str, said: str) -> None:
+    """Fails if a mistake in constants passes, or is not named."""
+    with pytest.raises(ParameterError) as error:
+        Options(material=law, constants=text)
+    assert said in str(error.value)
+
+
+@pytest.mark.parametrize(("options", "said"), [
+    ({"constants": "c1 = 1"}, "constants are those of another law than aaa"), ({"phi": -1.0}, "phi must be"),
+    ({"material": "gent", "c1": 0.5}, "c1 is a constant of aaa"),
+    ({"material": "steel"}, "material must be one of aaa")])
+def test_options_of_the_material_that_cannot_be(options: dict[str, Any], said: str) -> None:
+    """Fails if an option that does not belong to the law is silently left out."""
+    with pytest.raises(ParameterError) as error:
+        Options(**options)
+    assert said in str(error.value)
+
+
+# --- tables ---
+def test_tables_keep_what_they_say() -> None:
+    """Fails if a grip, traction or region changes in being written and read, or units are misread."""
+    grips = read_tables("grips", [{"boundary": "top", "x": 0, "z": [["1 min", "1 cm"], [120, 20]]}])
+    assert grips == ({"boundary": "top", "x": 0.0, "z": [[0.0, 0.0], [60.0, 10.0], [120.0, 20.0]]},)
+    assert grip_from(grips[0]) == Grip("top", (0.0, None, Ramp((60.0, 120.0), (10.0, 20.0))))
+    assert read_tables("tractions", [{"boundary": "a", "y": "10 kPa/s"}]) == ({"boundary": "a", "y": 0.01},)
+    region = {"name": "core", "material": "gent", "constants": "mu = 1 MPa", "phi": "500 kPa", "density": "1 g/cm^3"}
+    assert read_tables("regions", [region]) == (region | {"phi": 0.5, "density": 1000.0},)
+    parameters = {"mesh": "a.vtu", "grips": grips, "tractions": (), "regions": ()}
+    assert joined(tomllib.loads(tomllib_text(split(parameters))), custom=True) == {
+        **parameters, "grips": list(grips)}
+
+
+def tomllib_text(data: dict[str, Any]) -> str:
+    """TOML of a table."""
+    import tomli_w
+
+    return tomli_w.dumps(data)
+
+
+@pytest.mark.parametrize(("tables", "said"), [
+    ("[[grips]]\nx = 0", "grips: boundary must be a name"), ("[[grips]]\nboundary = 'top'\nw = 0", "'w' is none of"),
+    ("[[grips]]\nboundary = 'top'\ny = '1 mm'", "grip top, y must be a quantity in mm/s"),
+    ("[[grips]]\nboundary = 'top'\ny = true", "grip top, y must be a number"),
+    ("[[grips]]\nboundary = 'top'\ny = [[0, 0]]", "a ramp must have at least two points"),
+    ("[[grips]]\nboundary = 'top'\ny = [[0, 0], [0, 1]]", "times of a ramp must ascend; got 0, 0"),
+    ("[[grips]]\nboundary = 'top'\ny = [0, 1]", "a ramp has 2 to 1000 points"),
+    ("[[grips]]\nboundary = 'top'\ny = nan", "grip top, y must be a finite number"),
+    ("grips = 5", "grips must be tables [[grips]]"), ("[grips]\nboundary = 'top'", "grips must be tables [[grips]]"),
+    ("[[tractions]]\nboundary = 'top'\ny = '1 MPa'", "traction top, y must be a quantity in MPa/s"),
+    ("[[regions]]\nname = 'a'\nmaterial = 'steel'", "region a: material must be one of"),
+    ("[[regions]]\nname = 'a'\nphi = '1 mm'", "region a, phi must be a quantity in MPa"),
+    ("[parameters]\ngrips = []", "grips are tables beside the parameters"),
+    ("[[loads]]\n", "'loads' is none of case, parameters")])
+def test_what_are_no_tables(tables: str, said: str, tmp_path: Path) -> None:
+    """Fails if a mistake in a table passes, or its line does not say where and what."""
+    with pytest.raises(ParameterError) as error:
+        read_deck(deck(tmp_path, f'case = "custom"\n{tables}\n'))
+    assert said in str(error.value) and "\n" not in str(error.value)
+
+
+def test_only_custom_scenes_have_tables(tmp_path: Path) -> None:
+    """Fails if the grips of a case of the paper seem to be replaced by those of a deck."""
+    with pytest.raises(ParameterError, match="'grips' is none of case, parameters"):
+        read_deck(deck(tmp_path, 'case = "simple_shear"\n' + GRIPS))
+
+
+@pytest.mark.parametrize(("changed", "said"), [
+    ({"mesh": "coarse"}, "mesh must be the path of a mesh file"), ({"grips": ()}, "at least one grip or traction"),
+    ({"speed": 1.0}, "speed is for the cases"), ({"half": True}, "half is for the cases"),
+    ({"model": "auto"}, "model is for the cases"),
+    ({"grips": [Grip("lid", (0.0, 1.0))]}, "mesh plate has no boundary 'lid'; it has"),
+    ({"grips": [Grip("top", (0.0, 1.0, 2.0))]}, "grip top has a component z"),
+    ({"tractions": [Traction("top", (0.0, 1.0, 2.0))]}, "traction top has a component z"),
+    ({"regions": [RegionLaw("core")]}, "mesh plate has no set of elements 'core'; it has none")])
+def test_scenes_that_cannot_be(changed: dict[str, Any], said: str, folder: Path) -> None:
+    """Fails if a scene without sense is computed, or its line does not name what is wrong."""
+    own = {"mesh": "plate.vtu", "grips": [Grip("top", (0.0, 1e-3)), Grip("bottom", (0.0, 0.0))]}
+    options = {k: v for k, v in changed.items() if k in ("speed", "half", "model")}
+    own |= {k: v for k, v in changed.items() if k not in options}
+    with pytest.raises((ParameterError, MeshError)) as error:
+        custom(**own, options=Options(**options, length_scale=0.6, out=folder / "out", quiet=True))
+    assert said in str(error.value)
+    assert not (folder / "out").exists()
+
+
+# --- mesh files ---
+def test_sides_have_names_of_their_own(tmp_path: Path) -> None:
+    """Fails if the sides of a mesh without names are not found, or one that the mesh names is replaced."""
+    mesh = plate()
+    mesh.cell_sets = {"top": [np.zeros(0, int), np.array([0])]}
+    write_mesh(tmp_path / "plate.vtu", mesh)
+    sample = file_sample(tmp_path / "plate.vtu")
+    X = sample.space.X
+    for name, axis, end in (("left", 0, 0.0), ("right", 0, 4.0), ("bottom", 1, 0.0)):
+        assert (sample.nodes(name) == np.flatnonzero(X[:, axis] == end)).all() and sample.nodes(name).size > 5
+    assert sample.nodes("top").size == 2
+
+
+@pytest.mark.parametrize("suffix", [".vtu", ".inp", ".msh"])
+def test_sets_of_nodes_and_elements_are_found_in_mesh_files(suffix: str, tmp_path: Path) -> None:
+    """Fails if a set of nodes cannot be a boundary, or a set of elements no region, in a format that has them."""
+    mesh = plate()
+    middle = mesh.points[mesh.cells_dict["quad"]].mean(axis=1)
+    right = np.flatnonzero(middle[:, 0] > 2.0)
+    end = np.flatnonzero(mesh.points[:, 1] == 4.0)
+    path = tmp_path / f"mesh{suffix}"
+    if suffix == ".vtu":
+        mesh.cell_sets["half"] = [right, np.zeros(0, int)]
+        mesh.cell_sets["lid"] = mesh.cell_sets["top"]
+        write_mesh(path, mesh)
+    elif suffix == ".inp":
+        blocks = meshio.Mesh(mesh.points, [("quad", mesh.cells_dict["quad"])], cell_sets={"half": [right]},
+                             point_sets={"lid": end})
+        blocks.write(path)
+    else:
+        lines = mesh.cells_dict["line"]
+        tags = [np.where(np.isin(np.arange(len(middle)), right), 1, 2), np.where(np.isin(lines, end).all(axis=1), 3, 4)]
+        meshio.Mesh(mesh.points, [("quad", mesh.cells_dict["quad"]), ("line", lines)],
+                    cell_data={"gmsh:physical": tags, "gmsh:geometrical": tags},
+                    field_data={"half": np.array([1, 2]), "rest": np.array([2, 2]), "lid": np.array([3, 1])},
+                    ).write(path, file_format="gmsh22", binary=False)
+    sample = file_sample(path)
+    assert (sample.nodes("lid") == end).all()
+    assert (sample.elements("half") == right).all()
