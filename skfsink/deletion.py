@@ -12,18 +12,21 @@ from .state import State
 __all__ = ["delete_failed", "left_in"]
 
 
-def delete_failed(space: Space, state: State, threshold: float, failure_energy: float) -> np.ndarray:
+def delete_failed(space: Space, state: State, threshold: float, failure_energy: float | np.ndarray) -> np.ndarray:
     """Mark the elements that failed since the last accepted state; returns their numbers, ascending.
 
     An element fails when gamma <= `threshold` at all its Gauss points. It is logged with the time, and its area
-    (volume) times psi_f is added to U (Eq. 30). Call it on accepted states only: a trial that is given up must not
-    leave holes.
+    (volume) times psi_f, a number or one for each element (ne,), is added to U (Eq. 30). Call it on accepted states
+    only: a trial that is given up must not leave holes.
     """
     failed = np.flatnonzero(_spent(state.gamma, space.nodes, space.N, threshold, state.deleted))
     if failed.size:
         state.deleted[failed] = True
         state.deletions.extend((state.time, int(e)) for e in failed)
-        state.ledger.paper += failure_energy * float(space.V[failed].sum())
+        if isinstance(failure_energy, np.ndarray):
+            state.ledger.paper += float(failure_energy[failed] @ space.V[failed])
+        else:
+            state.ledger.paper += failure_energy * float(space.V[failed].sum())
     return failed
 
 

@@ -11,6 +11,7 @@ factorised. "nearest" gives each Gauss point to the node next to it.
 from __future__ import annotations
 
 import logging
+from collections.abc import Sequence
 
 import numpy as np
 from numba import njit
@@ -21,6 +22,7 @@ from .amg import AmgCG
 from .direct import Factorization
 from .errors import ConvergenceError, ParameterError
 from .material import SinkLaw
+from .regions import Region, by_element, check_lengths, rest_of
 from .space import Pattern, Space
 from .zone import ActiveZone
 
@@ -36,24 +38,32 @@ class DensitySolver:
     Parameters
     ----------
     space: the spaces.
-    law: sink and flux parameters.
+    law: sink and flux parameters, of the elements that are in no region.
     sink: one of `SINKS`.
     unchanged: a solve is left out when no sink coefficient moved by more than this, relatively, since the last one.
     active_zone: solves with a tolerance of their own are made where gamma changes (see :mod:`.zone`).
+    regions: elements with limiters of their own; the length l and epsilon are those of `law`.
 
     Attributes
     ----------
+    phi, failure_energy: Phi and psi_f [MPa], numbers, or where regions differ one for each element, (ne, 1) and (ne,).
     solves, skipped: how often it was solved, and left out because H had not changed.
     iterations: conjugate-gradient iterations so far.
     fallbacks: solves in which AMG-CG did not converge and the matrix was factorised instead.
     """
 
     def __init__(self, space: Space, law: SinkLaw, sink: str = "lumped", tolerance: float = 1e-8,
-                 unchanged: float = 1e-12, active_zone: bool = True) -> None:
+                 unchanged: float = 1e-12, active_zone: bool = True, regions: Sequence[Region] = ()) -> None:
         if sink not in SINKS:
             raise ParameterError(f"sink must be one of {', '.join(SINKS)}; got {sink!r}")
         self.space, self.law, self.sink = space, law, sink
         self.unchanged = unchanged
+        check_lengths(law, regions)
+        ne = space.n_elements
+        self._parts = [(rest_of(regions, ne), law), *((region.elements, region.sink_law) for region in regions)]
+        phi = by_element(ne, law.phi, regions, lambda region: region.sink_law.phi)
+        self.phi = phi[:, None] if isinstance(phi, np.ndarray) else phi
+        self.failure_energy = by_element(ne, law.failure_energy, regions, lambda region: region.sink_law.failure_energy)
         self.pattern = Pattern(space)
         self.load = self._lump(np.ones_like(space.w))
         self._laplacian = kernels.laplacian(space, self.pattern, law.length_scale**2)
@@ -92,7 +102,7 @@ class DensitySolver:
         """
         if not np.isfinite(W_max.max()):  # infinite, it would make a dead point in silence
             raise ConvergenceError("the stored energy of a Gauss point is not finite: lower --courant or --hht-dt")
-        sink = 1.0 / (self.law.history(W_max) + self.law.epsilon)
+        sink = 1.0 / (self._history(W_max) + self.law.epsilon)
         if self.last_sink is not None and not _changed(sink, self.last_sink, self.unchanged):
             self.skipped += 1
             return gamma
@@ -108,6 +118,15 @@ class DensitySolver:
                                    f"mesh has elements so flat that the lumped sink loses its maximum principle")
         self.last_sink = sink
         return result
+
+    def _history(self, W_max: np.ndarray) -> np.ndarray:
+        """H of Eq. (10), (ne, nq), each element by its law."""
+        if len(self._parts) == 1:
+            return self.law.history(W_max)
+        H = np.empty_like(W_max)
+        for elements, law in self._parts:
+            H[elements] = law.history(W_max[elements])
+        return H
 
     def _iterate(self, A: csr_array, D: np.ndarray, gamma: np.ndarray, tolerance: float | None) -> np.ndarray | None:
         """Solution by AMG-CG, in the active zone where that is enough; None if it did not converge."""

@@ -194,7 +194,7 @@ class Explicit:
         state.gamma = self.density.solve(state.W_max, state.gamma, self.GAMMA_TOLERANCE)
         if self.density.solves == solves:
             return
-        failed = delete_failed(self.space, state, self.deletion, self.density.law.failure_energy)
+        failed = delete_failed(self.space, state, self.deletion, self.density.failure_energy)
         left = left_in(momentum, state.gamma, failed) if failed.size else 0.0
         stored = momentum.set_gamma(state.gamma, state.deleted)
         mass, self.mass = self.mass, momentum.lumped_mass(self._mass_floor)
@@ -219,8 +219,8 @@ class Explicit:
 
     @property
     def _interval(self) -> float:
-        """Longest time between solves for gamma that leaves the motion of a crack accurate [s]."""
-        return self.GAMMA_INTERVAL * self.density.law.length_scale / (self.momentum.material.shear_wave_speed * 1e3)
+        """Longest time between solves for gamma that leaves the motion of a crack accurate, in any material [s]."""
+        return self.GAMMA_INTERVAL * self.density.law.length_scale / (self.momentum.shear_wave_speeds[1] * 1e3)
 
     # --- the step size ---
     def _set_step(self, state: State) -> None:

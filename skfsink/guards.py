@@ -16,6 +16,7 @@ import numpy as np
 from . import indicators
 from .errors import InstabilityError
 from .momentum import Momentum
+from .regions import Region
 from .scene import Scene
 from .state import State
 
@@ -106,15 +107,17 @@ class Guard:
     # --- before the run ---
     def check_scene(self) -> None:
         """Warn of a material, an element or a mesh beyond the range of the methods."""
-        material, space, l = self.scene.material, self.space, self.scene.sink_law.length_scale
-        ratio = material.bulk_modulus / material.shear_modulus
+        space, l = self.space, self.scene.sink_law.length_scale
+        # the part that is least compressible for its shear modulus is the first to lock, and the first to lose digits
+        part = max(self.scene.parts, key=lambda part: part.material.bulk_modulus / part.material.shear_modulus)
+        ratio = part.material.bulk_modulus / part.material.shear_modulus
         if self.scene.controls.element == "plain" and ratio > self.LOCKS:
-            log.warning("the plain element locks at k/mu = %.4g (above %g): stiffness, onset load and U come out too "
-                        "high; take --element jbar", ratio, self.LOCKS)
+            log.warning("the plain element locks at k/mu = %.4g (above %g)%s: stiffness, onset load and U come out too "
+                        "high; take --element jbar", ratio, self.LOCKS, self._where(part))
         if ratio > self.STIFF and self.scene.controls.element != "planestress":
-            log.warning("k/mu = %.3g is so large (above %g) that rounding comes near the tolerance of equilibria, and "
-                        "the explicit step falls with its root; with --bulk-modulus %.3g the solid is as good as "
-                        "incompressible", ratio, self.STIFF, 1e3 * material.shear_modulus)
+            log.warning("k/mu = %.3g%s is so large (above %g) that rounding comes near the tolerance of equilibria, "
+                        "and the explicit step falls with its root; with --bulk-modulus %.3g the solid is as good as "
+                        "incompressible", ratio, self._where(part), self.STIFF, 1e3 * part.material.shear_modulus)
         h = float(space.h.min())
         if h > l / self.COARSE:
             log.warning("no element is finer than h = %.3g mm, l/h = %.2f (less than %g): onset and U are those of the "
@@ -133,23 +136,38 @@ class Guard:
         InstabilityError
             The ledger of the loading does not close, or a live point is inside out.
         """
-        space, l, k = self.space, self.scene.sink_law.length_scale, self.scene.material.bulk_modulus
+        space, l = self.space, self.scene.sink_law.length_scale
         weakest = int(np.argmin(state.gamma))
         h = indicators.size_near(space, weakest, l)
         if h > l / self.COARSE:
             log.warning("where it begins to fail, at %s mm, elements have h = %.3g mm, l/h = %.2f (less than %g): "
                         "onset and U are those of the mesh; refine it there to h <= l/3, or raise --length-scale",
                         _place(space.X[weakest]), h, l / h, self.COARSE)
-        amplitude = indicators.alternation(space, indicators.element_pressure(space, state.u, k))
-        if self.scene.controls.element == "jbar" and amplitude > self.CHECKERED * self.scene.material.shear_modulus:
-            log.warning("pressures of neighbouring elements alternate by %.3g MPa (above %g mu): a checkerboard, with "
-                        "%.2g of the energy limiter; break up the rows of the mesh, or lower --bulk-modulus", amplitude,
-                        self.CHECKERED, amplitude**2 / (2 * k) / self.scene.sink_law.phi)
+        self._check_pressure(state)
         error, allowed = state.ledger.error(state.ledger.elastic), self.scene.controls.balance_tolerance
         if not error <= allowed:
             raise InstabilityError(f"the ledger of the loading is open by {error:.2%} of the stored energy, allowed "
                                    f"{allowed:.2%}: take smaller load increments, or raise --balance-tolerance")
         self._check_shape(state)
+
+    def _check_pressure(self, state: State) -> None:
+        """Pressures that alternate, in each material for itself: they jump from one to another."""
+        if self.scene.controls.element != "jbar":
+            return
+        for part in self.scene.parts:
+            k = part.material.bulk_modulus
+            amplitude = indicators.alternation(self.space, indicators.element_pressure(self.space, state.u, k),
+                                               part.elements)
+            if amplitude > self.CHECKERED * part.material.shear_modulus:
+                log.warning("pressures of neighbouring elements alternate by %.3g MPa (above %g mu)%s: a checkerboard, "
+                            "with %.2g of the energy limiter; break up the rows of the mesh, or lower --bulk-modulus",
+                            amplitude, self.CHECKERED, self._where(part), amplitude**2 / (2 * k) / part.sink_law.phi)
+
+    def _where(self, part: Region) -> str:
+        """Of which material a warning speaks, if there are several."""
+        if len(self.scene.parts) == 1:
+            return ""
+        return f" in region {part.name}" if part.name else " outside of the regions"
 
     # --- during the event ---
     def check_step(self, state: State) -> None:

@@ -83,11 +83,12 @@ class HHT:
         self.solver = Factorization(self._pattern, threads=threads)
         self.dt = self.controls.dt_first or self.controls.dt
         size = float(np.ptp(self.space.X, axis=0).max())
-        self._transit = size / (momentum.material.shear_wave_speed * 1e3)  # of a shear wave through the body [s]
+        slowest, fastest = (speed * 1e3 for speed in momentum.shear_wave_speeds)
+        self._transit = size / slowest  # of the slowest shear wave through the body [s]
         self._rate = np.zeros_like(self.space.X)                           # du/dt of the last step
-        self._failing_step = 0.1 * density.law.length_scale / (momentum.material.shear_wave_speed * 1e3)
+        self._failing_step = 0.1 * density.law.length_scale / fastest  # a crack may run in any of the materials
         h = float(self.space.h.min())  # forces and displacements so small that rounding hides them
-        self._rounding = 1e-9 * momentum.material.shear_modulus * h ** (self.space.dim - 1), 1e-9 * h
+        self._rounding = 1e-9 * momentum.shear_moduli[1] * h ** (self.space.dim - 1), 1e-9 * h
         self.rejected = self.iterations = 0
         self._cut = False  # whether a step was cut because a crack ran through it
 
@@ -272,7 +273,7 @@ class HHT:
         state.grip += dt
         state.step += 1
         before = gamma_new
-        if delete_failed(self.space, state, self.deletion, self.density.law.failure_energy).size:
+        if delete_failed(self.space, state, self.deletion, self.density.failure_energy).size:
             momentum.set_gamma(state.gamma, state.deleted)
             ledger.deletion += float(np.einsum("eq,eq,eq->", w, before - momentum.gamma, trial.W))
         self._mass, self._places = self.inertia.matrix(), self.inertia.places()

@@ -81,18 +81,19 @@ def element_pressure(space: Space, u: np.ndarray, bulk_modulus: float) -> np.nda
     return bulk_modulus * (space.element_mean(np.linalg.det(F)) - 1.0)
 
 
-def alternation(space: Space, pressure: np.ndarray) -> float:
+def alternation(space: Space, pressure: np.ndarray, part: np.ndarray | slice = slice(None)) -> float:
     """Amplitude [MPa] with which element pressures (ne,) alternate: rms of what a smoothing over the nodes takes away.
 
     Each element is compared with the mean over its nodes of the mean over their elements: a pressure that is linear in
-    space passes on an even mesh, a checkerboard is taken away as a whole.
+    space passes on an even mesh, a checkerboard is taken away as a whole. `part` says which elements are looked at, as
+    if the others were not there: the pressure jumps where materials meet.
     """
-    weight = space.V
-    elements = np.repeat(np.arange(space.n_elements), space.conn.shape[1])
-    nodes = space.conn.ravel()
+    weight, pressure, conn = space.V[part], pressure[part], space.conn[part]
+    elements = np.repeat(np.arange(len(conn)), conn.shape[1])
+    nodes = conn.ravel()
     total = np.bincount(nodes, weight[elements], space.n_nodes)
-    at_nodes = np.bincount(nodes, (weight * pressure)[elements], space.n_nodes) / total
-    rough = pressure - at_nodes[space.conn].mean(axis=1)
+    at_nodes = np.bincount(nodes, (weight * pressure)[elements], space.n_nodes) / np.maximum(total, 1e-300)
+    rough = pressure - at_nodes[conn].mean(axis=1)
     return float(np.sqrt(weight @ rough**2 / weight.sum()))
 
 

@@ -33,7 +33,7 @@ class Inertia:
         """Mass by place: at the nodes (n,), or for Eq. (28) at the Gauss points (ne, nq) [t; t/mm in 2D]."""
         if self.kind == "lumped":
             return self.momentum.lumped_mass(self.floor)
-        return self.space.w * self.momentum.material.rho0 * self.momentum.gamma
+        return self.space.w * self.momentum.rho0 * self.momentum.gamma
 
     def half_v2(self, v: np.ndarray) -> np.ndarray:
         """|v|^2/2 in the same places [mm^2/s^2]."""

@@ -23,6 +23,7 @@ from .errors import OutputError
 from .files import reported
 from .history import History, Table
 from .output import SUMMARY, frame_times, read_summary
+from .tables import joined
 
 if TYPE_CHECKING:
     from .scene import Scene
@@ -31,7 +32,7 @@ __all__ = ["ENERGIES", "FIELD_UNITS", "Deletions", "Energy", "Frames", "Run", "l
 
 #: Units of the fields of a frame.
 FIELD_UNITS = {"displacement": "mm", "velocity": "mm/s", "gamma": "1", "deleted": "1", "W": "MPa", "gamma_element": "1",
-               "stress": "MPa", "pressure": "MPa", "von_mises": "MPa"}
+               "stress": "MPa", "pressure": "MPa", "von_mises": "MPa", "region": "1"}
 #: Rows of :attr:`Run.energies`: name, columns of the history that add up to it, meaning.
 ENERGIES: tuple[tuple[str, tuple[str, ...], str], ...] = (
     ("elastic", ("elastic",), "elastic energy, γ-weighted"),
@@ -238,7 +239,8 @@ def load(folder: str | Path) -> Run:
     try:
         with reported(f"cannot read {path}"):
             data = tomllib.loads(path.read_text(encoding="utf-8"))
-        case, parameters = str(data["case"]), dict(data["parameters"])
+        case = str(data["case"])
+        parameters = joined(data, case == "custom")
         assumed, choice = tuple(map(str, data.get("assumed", ()))), dict(data.get("choice", {}))
     except (UnicodeDecodeError, tomllib.TOMLDecodeError, KeyError, TypeError, ValueError) as error:
         raise OutputError(f"{path} is not the scene of a run: {error}") from None

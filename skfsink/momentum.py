@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import NamedTuple
+
 import numpy as np
 
 from . import kernels
 from .errors import ParameterError
 from .material import GeneralMaterial, Material
 from .pattern import Pattern
+from .regions import Region, by_element, rest_of
 from .space import Space
 
-__all__ = ["ELEMENTS", "Momentum", "check_element"]
+__all__ = ["ELEMENTS", "Momentum", "Part", "check_element"]
 
 ELEMENTS = ("jbar", "plain", "planestress")
 
@@ -21,47 +25,75 @@ def check_element(element: str, space: Space) -> None:
         raise ParameterError("element planestress is for meshes of quadrilaterals; this one has hexahedra: take jbar")
 
 
+class Part(NamedTuple):
+    """Elements of one material: their numbers (None: the whole body), and the directions of their fibres, if any."""
+
+    material: Material
+    elements: np.ndarray | None
+    fibres: np.ndarray | None
+
+
 class Momentum:
     """Internal force and its derivatives (Eq. 14-19, 28) for the relative density last given.
 
     Parameters
     ----------
-    space, material: the spaces and the stored energy.
+    space, material: the spaces and the stored energy, of the elements that are in no region.
     element: "jbar" for the element-constant J_bar, "plain" for the standard element, "planestress" for a thin sheet of
         quadrilaterals, whose forces, energies and masses are per mm of undeformed thickness as in plane strain.
     force_floor: Gauss points with gamma below this exert no force. Their stiffness and mass are then gone together.
     threads: that share the loops over elements; results do not depend on their number.
+    regions: elements of other materials.
 
     Attributes
     ----------
+    parts: the body by its materials.
+    rho0: density of the intact solid [t/mm^3], a number, or where materials differ one for each element (ne, 1).
+    shear_moduli, shear_wave_speeds: least and greatest of the materials [MPa; m/s].
     energy: gamma-weighted stored energy at the last evaluation [N mm; N mm/mm in 2D].
     least_J: least J (plane stress: its part in the plane) at a Gauss point with gamma > 0 at the last evaluation.
     evaluations: how often the force was evaluated.
-    fibres: directions in each element (ne, families, 3), for laws of several invariants, else None.
     """
 
     def __init__(self, space: Space, material: Material, element: str = "jbar", force_floor: float = 1e-3,
-                 threads: int = 1) -> None:
+                 threads: int = 1, regions: Sequence[Region] = ()) -> None:
         if element not in ELEMENTS:
             raise ParameterError(f"element must be one of {', '.join(ELEMENTS)}; got {element!r}")
         check_element(element, space)
         self.space, self.material, self.force_floor = space, material, force_floor
         self.j_bar = element == "jbar"
         self.plane_stress = element == "planestress"
-        self.fibres: np.ndarray | None = None
-        if isinstance(material, GeneralMaterial):
-            if self.plane_stress:
-                raise ParameterError("element planestress is for laws of I1' alone; "
-                                     f"{type(material).__name__} has more invariants: take jbar")
-            self.fibres = material.fibres(space.X[space.conn].mean(axis=1))
-        self.tiles = kernels.Tiles(space, self.plane_stress, threads, self.fibres)
+        self.parts = self._divide(regions)
+        materials = [part.material for part in self.parts]
+        self._laws = [kernels.Law(m.compiled_law, m.constants, m.bulk_modulus) for m in materials]
+        self.tiles = kernels.Tiles(space, self.plane_stress, threads,
+                                   [(part.elements, part.fibres) for part in self.parts])
+        moduli, speeds = [m.shear_modulus for m in materials], [m.shear_wave_speed for m in materials]
+        self.shear_moduli, self.shear_wave_speeds = (min(moduli), max(moduli)), (min(speeds), max(speeds))
+        rho0 = by_element(space.n_elements, material.rho0, regions, lambda region: region.material.rho0)
+        self.rho0 = rho0[:, None] if isinstance(rho0, np.ndarray) else rho0
         self.energy = 0.0
         self.least_J = 1.0
         self.evaluations = 0
-        self._constants = material.constants
-        self._intact = space.lump(np.ones_like(space.w)) * material.rho0
+        self._intact = self._lumped(np.ones_like(space.w))
         self._gamma: np.ndarray | None = np.ones_like(space.w)
         self.tiles.set_gamma(self._gamma)
+
+    def _divide(self, regions: Sequence[Region]) -> list[Part]:
+        """The body by its materials; without regions it is one part, all elements in their order."""
+        space, parts = self.space, []
+        rest = rest_of(regions, space.n_elements)
+        for material, elements in ((self.material, rest), *((r.material, r.elements) for r in regions)):
+            if not elements.size:
+                continue
+            fibres = None
+            if isinstance(material, GeneralMaterial):
+                if self.plane_stress:
+                    raise ParameterError("element planestress is for laws of I1' alone; "
+                                         f"{type(material).__name__} has more invariants: take jbar")
+                fibres = material.fibres(space.X[space.conn[elements]].mean(axis=1))
+            parts.append(Part(material, elements if elements.size < space.n_elements else None, fibres))
+        return parts
 
     @property
     def gamma(self) -> np.ndarray:
@@ -92,9 +124,7 @@ class Momentum:
     def force(self, u: np.ndarray, out: np.ndarray | None = None) -> np.ndarray:
         """Internal force at the displacement `u`, (n, dim) [N; N/mm in 2D]. Sets `energy`, `least_J` and `W`."""
         out = np.empty_like(self.space.X) if out is None else out
-        m = self.material
-        self.least_J = self.tiles.force(self.space.X + u, m.compiled_law, self._constants, m.bulk_modulus, out,
-                                        self.j_bar)
+        self.least_J = self.tiles.force(self.space.X + u, self._laws, out, self.j_bar)
         self.energy = float(self.tiles.psi.sum())
         self.evaluations += 1
         return out
@@ -106,12 +136,19 @@ class Momentum:
 
     def tangent(self, pattern: Pattern, u: np.ndarray, convex: bool = False) -> np.ndarray:
         """Data of the tangent stiffness at `u` on `pattern`; with `convex` one that is positive at every point."""
+        data, *others = (self._tangent(part, pattern, u, convex) for part in self.parts)
+        for other in others:
+            data += other
+        return data
+
+    def _tangent(self, part: Part, pattern: Pattern, u: np.ndarray, convex: bool) -> np.ndarray:
+        material, elements, fibres = part
         if self.plane_stress:
-            return kernels.tangent_plane_stress(self.space, pattern, self.material, u, self.gamma, convex)
-        if isinstance(self.material, GeneralMaterial) and self.fibres is not None:
-            return kernels.tangent_general(self.space, pattern, self.material, u, self.gamma, self.fibres, self.j_bar,
-                                           convex)
-        return kernels.tangent(self.space, pattern, self.material, u, self.gamma, self.j_bar, convex)
+            return kernels.tangent_plane_stress(self.space, pattern, material, u, self.gamma, convex, elements)
+        if isinstance(material, GeneralMaterial) and fibres is not None:
+            return kernels.tangent_general(self.space, pattern, material, u, self.gamma, fibres, self.j_bar, convex,
+                                           elements)
+        return kernels.tangent(self.space, pattern, material, u, self.gamma, self.j_bar, convex, elements)
 
     def stiffest(self, u: np.ndarray, inverse_mass: np.ndarray) -> float:
         """Cheap indicator of the highest frequency squared at `u`, and below it [1/s^2].
@@ -119,15 +156,21 @@ class Momentum:
         The greatest Rayleigh quotient of what each element resists most: a change of volume, or of area in plane
         stress. `inverse_mass` (n, dim) is zero where a degree of freedom is held.
         """
-        x, m = self.space.X + u, self.material
+        x = self.space.X + u
         if self.plane_stress:
-            return self.tiles.plane_stiffness(x, m.compiled_law, self._constants, m.bulk_modulus, inverse_mass)
-        return self.tiles.volumetric(x, inverse_mass) * m.bulk_modulus
+            return self.tiles.plane_stiffness(x, self._laws, inverse_mass)
+        return self.tiles.volumetric(x, [law.bulk_modulus for law in self._laws], inverse_mass)
 
     def consistent_mass(self, pattern: Pattern) -> np.ndarray:
         """Data of the mass matrix of Eq. (28) on `pattern`."""
-        return kernels.mass(self.space, pattern, self.gamma, self.material.rho0)
+        return kernels.mass(self.space, pattern, self.gamma, self.rho0)
 
     def lumped_mass(self, floor: float) -> np.ndarray:
         """Row sums (n,) [t; t/mm in 2D] of Eq. (28), at least `floor` times those of the intact solid."""
-        return np.maximum(self.space.lump(self.gamma) * self.material.rho0, floor * self._intact)
+        return np.maximum(self._lumped(self.gamma), floor * self._intact)
+
+    def _lumped(self, gamma: np.ndarray) -> np.ndarray:
+        """Row sums (n,) of the mass matrix."""
+        if isinstance(self.rho0, np.ndarray):
+            return self.space.lump(gamma * self.rho0)
+        return self.space.lump(gamma) * self.rho0

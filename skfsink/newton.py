@@ -51,11 +51,11 @@ class Newton:
         self.solver = Factorization(self.pattern, threads=threads)
         self.steps = self.iterations = 0
         self._volume = self.space.lump(np.ones_like(self.space.w))
-        # a body that has come apart bears no force; this says what counts as none
+        # a body that has come apart bears no force; this says what counts as none, in the softest material too
         size = float(self.space.V.sum()) ** (1 - 1 / self.space.dim)
-        self._least_force = 1e-3 * momentum.material.shear_modulus * size
-        # rounding of the stored energy: I1' - 3 is a difference of numbers of order one
-        self._noise = 1e-14 * momentum.material.shear_modulus * float(self.space.V.sum())
+        self._least_force = 1e-3 * momentum.shear_moduli[0] * size
+        # rounding of the stored energy, most in the stiffest one: I1' - 3 is a difference of numbers of order one
+        self._noise = 1e-14 * momentum.shear_moduli[1] * float(self.space.V.sum())
         self._kept: tuple[np.ndarray, np.ndarray] | None = None  # displacement and gamma the factors were made at
         self._slow = False  # whether the factors have become too old to be used as they are
         self._spent = 0     # iterations and assemblies since they were made

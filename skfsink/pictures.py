@@ -44,8 +44,11 @@ def draw_run(scene: Scene, folder: Path, recorder: Recorder) -> None:
     if not quasistatic:
         speed_picture(space, [frames[k] for k in keys], folder / "speed.png", title, scene.view)
     ledger_picture(history, folder / "energies.png", title)
-    tip_picture(history, folder / "tip.png", title, np.nan if quasistatic else scene.material.shear_wave_speed,
-                np.nan if quasistatic else scene.material.rayleigh_wave_speed)
+    part = max(scene.parts, key=lambda part: int(frames[-1].deleted[part.elements].sum()))  # where the crack has run
+    if len(scene.parts) > 1 and not quasistatic:
+        title += f"\n$c_s$, $c_R$ {'in region ' + part.name if part.name else 'outside of the regions'}"
+    tip_picture(history, folder / "tip.png", title, np.nan if quasistatic else part.material.shear_wave_speed,
+                np.nan if quasistatic else part.material.rayleigh_wave_speed)
     animation(space, frames, folder / "animation.gif", view=scene.view)
 
 

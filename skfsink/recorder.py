@@ -36,8 +36,10 @@ class Recorder:
         self.scene, self.momentum, self.density = scene, momentum, density
         sample, space = scene.sample, scene.sample.space
         held = [sample.nodes(grip.boundary) for grip in scene.grips]
-        self.tracker = CrackTracker(space, scene.sink_law.length_scale, scene.material.shear_wave_speed, held,
+        # a tip in the slowest material has to have moved between two looks at it
+        self.tracker = CrackTracker(space, scene.sink_law.length_scale, momentum.shear_wave_speeds[0], held,
                                     sample.rim(*scene.faces))
+        self._cells = {"region": scene.region_numbers} if scene.regions else {}
         if memory is None:
             prepare_folder(folder / "series", overwrite=True)
         self.series = Series(folder / "series", "run", space)
@@ -128,7 +130,7 @@ class Recorder:
             {"displacement": state.u, "velocity": state.v, "gamma": state.gamma},
             {"deleted": state.deleted.astype(np.int8), "W": space.element_mean(np.minimum(momentum.W, 1e3)),
              "gamma_element": space.element_mean(momentum.gamma), "stress": stress, "pressure": pressure(stress),
-             "von_mises": von_mises(stress)})
+             "von_mises": von_mises(stress), **self._cells})
 
     def _record(self, state: State, reaction: np.ndarray, dt: float) -> None:
         self.tips = self.tracker.look(state.time, state.gamma)

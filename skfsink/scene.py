@@ -22,7 +22,7 @@ from .hht import HHTControls
 from .loads import Grip, Traction
 from .material import Material, SinkLaw
 from .momentum import ELEMENTS, check_element
-from .regions import Region
+from .regions import Region, check_lengths, divided
 from .sample import Sample
 from .statics import StaticsControls
 from .tables import joined, split
@@ -143,7 +143,7 @@ class Scene:
     MeshError
         The mesh lacks the boundary of a grip.
     ParameterError
-        The element is not for meshes of this dimension.
+        The element is not for meshes of this dimension, or a region for this body.
     """
 
     case: str
@@ -168,6 +168,21 @@ class Scene:
         for boundary in (load.boundary for group in (self.grips, self.rollers, self.tractions) for load in group):
             self.sample.nodes(boundary)
         check_element(self.controls.element, self.sample.space)
+        check_lengths(self.sink_law, self.regions)
+        _ = self.parts
+
+    @property
+    def parts(self) -> tuple[Region, ...]:
+        """The body by its materials: what is in no region first, with an empty name, if there is any."""
+        return divided(self.sample.space.n_elements, self.material, self.sink_law, self.regions)
+
+    @property
+    def region_numbers(self) -> np.ndarray:
+        """Number of the region each element is in, from 1, (ne,); 0 where it is in none."""
+        numbers = np.zeros(self.sample.space.n_elements, np.int32)
+        for i, region in enumerate(self.regions):
+            numbers[region.elements] = i + 1
+        return numbers
 
     def part(self, analysis: str) -> Scene:
         """This scene in one of the two analyses."""
@@ -207,6 +222,8 @@ class Scene:
         hashed, space = hashlib.sha256(text.encode()), self.sample.space
         for array in (space.X, space.conn, *(nodes for _, nodes in sorted(self.sample.boundaries.items()))):
             hashed.update(array.tobytes())
+        for region in self.regions:
+            hashed.update(f"{region.name} {region.material} {region.sink_law}".encode() + region.elements.tobytes())
         return hashed.hexdigest()
 
 

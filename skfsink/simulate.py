@@ -62,8 +62,10 @@ class Simulation:
         self.scene, self.folder, self.display = scene, folder, display
         c, space = scene.controls, scene.sample.space
         self.free, self.grip_velocity = scene.constraints()
-        self.momentum = Momentum(space, scene.material, c.element, c.force_floor, c.workers(space.dim))
-        self.density = DensitySolver(space, scene.sink_law, c.sink, active_zone=c.active_zone)
+        self.momentum = Momentum(space, scene.material, c.element, c.force_floor, c.workers(space.dim),
+                                 scene.regions)
+        self.density = DensitySolver(space, scene.sink_law, c.sink, active_zone=c.active_zone,
+                                     regions=scene.regions)
         self.statics = Statics(self.momentum, self.density, self.free, self.grip_velocity, c.statics, c.deletion,
                                c.workers(space.dim))
         self.recorder = Recorder(scene, folder, self.momentum, self.density,

@@ -214,7 +214,7 @@ class Statics:
             state.step += 1
             state.time = float(state.step)
             undeleted = self.momentum.effective(gamma, state.deleted)
-            delete_failed(self.space, state, self.deletion, self.density.law.failure_energy)
+            delete_failed(self.space, state, self.deletion, self.density.failure_energy)
             self.momentum.set_gamma(gamma, state.deleted)
             ledger.drop(self.space.w, W, old, undeleted)
             ledger.deletion += float(np.einsum("eq,eq,eq->", self.space.w, W, undeleted - self.momentum.gamma))
@@ -244,11 +244,11 @@ class Statics:
         """Let the history follow `W` (ne, nq) where failure is nearest; True if points that fail had to wait.
 
         Points past the energy limiter wait while another one is much further past it: once that has failed and forces
-        have found their new ways, most of them are relieved.
+        have found their new ways, most of them are relieved. How far is W/Phi, with the limiter of each material.
         """
-        phi = self.density.law.phi
-        most = float(W[self.momentum.gamma > 0].max(initial=0.0))
-        waiting = (phi < W) & (self.controls.front * most > W) & (state.W_max < W)
+        ratio = W / self.density.phi
+        most = float(ratio[self.momentum.gamma > 0].max(initial=0.0))
+        waiting = (ratio > 1) & (self.controls.front * most > ratio) & (state.W_max < W)
         state.W_max = np.where(waiting, state.W_max, np.maximum(state.W_max, W))
         return bool(waiting.any())
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from .kernels.lanes import J_FLOOR
 from .material import GeneralMaterial
-from .momentum import Momentum
+from .momentum import Momentum, Part
 
 __all__ = ["cauchy_stress", "pressure", "von_mises"]
 
@@ -23,17 +23,22 @@ def cauchy_stress(momentum: Momentum, u: np.ndarray) -> np.ndarray:
     """
     space, gamma = momentum.space, momentum.gamma
     means = np.zeros((space.n_elements, 6))
-    for start in range(0, space.n_elements, _CHUNK):
-        part = slice(start, start + _CHUNK)
-        means[part] = np.einsum("eq,eqc->ec", space.w[part], _at_points(momentum, u, part, gamma[part]))
+    for part in momentum.parts:
+        for start in range(0, space.n_elements if part.elements is None else part.elements.size, _CHUNK):
+            rows = slice(start, start + _CHUNK)
+            elements = rows if part.elements is None else part.elements[rows]
+            means[elements] = np.einsum("eq,eqc->ec", space.w[elements],
+                                        _at_points(momentum, u, part, rows, gamma[elements]))
     return np.asarray(means / space.V[:, None])
 
 
-def _at_points(momentum: Momentum, u: np.ndarray, part: slice, gamma: np.ndarray) -> np.ndarray:
-    space, material, k = momentum.space, momentum.material, momentum.material.bulk_modulus
+def _at_points(momentum: Momentum, u: np.ndarray, part: Part, rows: slice, gamma: np.ndarray) -> np.ndarray:
+    """Stress at the Gauss points of some elements of a part, whose density is `gamma`."""
+    space, material, k = momentum.space, part.material, part.material.bulk_modulus
+    elements = rows if part.elements is None else part.elements[rows]
     F = np.zeros((*gamma.shape, 3, 3))
     F[...] = np.eye(3)
-    F[..., :space.dim, :space.dim] += np.einsum("eai,eqaJ->eqiJ", u[space.conn[part]], space.dN[part])
+    F[..., :space.dim, :space.dim] += np.einsum("eai,eqaJ->eqiJ", u[space.conn[elements]], space.dN[elements])
     raw = _determinant(F)
     F[raw < J_FLOOR] = np.eye(3)  # only points without stiffness get there
     if momentum.plane_stress:
@@ -41,10 +46,10 @@ def _at_points(momentum: Momentum, u: np.ndarray, part: slice, gamma: np.ndarray
     J_bar = J = _determinant(F)
     gamma_bar = gamma
     if momentum.j_bar:
-        w = space.w[part]
+        w = space.w[elements]
         J_bar, gamma_bar = ((w * a).sum(axis=1, keepdims=True) / w.sum(axis=1, keepdims=True) for a in (raw, gamma))
-    if isinstance(material, GeneralMaterial) and momentum.fibres is not None:
-        tau = material.isochoric_stress(F, fibres=momentum.fibres[part][:, None]) @ np.swapaxes(F, -1, -2)
+    if isinstance(material, GeneralMaterial) and part.fibres is not None:
+        tau = material.isochoric_stress(F, fibres=part.fibres[rows][:, None]) @ np.swapaxes(F, -1, -2)
         return np.asarray((gamma / J)[..., None] * tau[..., _VOIGT[0], _VOIGT[1]]
                           + (gamma_bar * k * (J_bar - 1))[..., None] * np.array([1.0, 1, 1, 0, 0, 0]))
     b = F @ np.swapaxes(F, -1, -2)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +13,7 @@ from skfsink.density import DensitySolver
 from skfsink.energy import Ledger
 from skfsink.material import AAA, SinkLaw
 from skfsink.momentum import Momentum
+from skfsink.regions import Region
 from skfsink.space import Space
 from skfsink.state import State
 from skfsink.statics import Statics
@@ -101,9 +102,9 @@ class Fracture(NamedTuple):
     velocity: np.ndarray
 
 
-def at_onset(space: Space, speed: float = 1e-3, overshoot: float = 0.01) -> Fracture:
+def at_onset(space: Space, speed: float = 1e-3, overshoot: float = 0.01, regions: Sequence[Region] = ()) -> Fracture:
     """`space` loaded to its onset and scaled just past it, as the event of a run begins."""
-    momentum, density = Momentum(space, AAA()), DensitySolver(space, SinkLaw())
+    momentum, density = Momentum(space, AAA(), regions=regions), DensitySolver(space, SinkLaw(), regions=regions)
     free, velocity = grips(space, speed)
     state = State.intact(space)
     for _ in Statics(momentum, density, free, velocity).load(state):

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 from skfsink.errors import ParameterError
 from skfsink.forms import momentum_forms
 from skfsink.hht import HHTControls
-from skfsink.kernels import Tiles, tangent
+from skfsink.kernels import Law, Tiles, tangent
 from skfsink.material import AAA, Material, NeoHookean, SinkLaw
 from skfsink.pattern import Pattern
 from skfsink.space import Space
@@ -250,7 +250,7 @@ def test_a_third_material_is_one_class(space: Space):
     tiles = Tiles(space)
     tiles.set_gamma(gamma)
     force = np.empty_like(u)
-    tiles.force(space.X + u, material.law, material.constants, material.bulk_modulus, force)
+    tiles.force(space.X + u, [Law(material.law, material.constants, material.bulk_modulus)], force)
     basis, forms = space.u_basis, momentum_forms(material)
     fields = {"displacement": u.ravel(), "gamma": gamma, "dV": basis.dx}
     expected = forms.residual.assemble(basis, **fields)

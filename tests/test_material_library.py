@@ -308,7 +308,7 @@ def test_results_do_not_depend_on_threads(body: Space, monkeypatch: pytest.Monke
 def test_stress_for_the_files_gives_the_nodal_forces(body: Space):
     """Fails if the Cauchy stress that is written leaves out a term of the loops, or takes other elements' fibres."""
     momentum, u = momentum_of(body, Hoops(**TISSUE), patchy(body)), wavy(body, 0.15)
-    s = stress._at_points(momentum, u, slice(None), momentum.gamma)
+    s = stress._at_points(momentum, u, momentum.parts[0], slice(None), momentum.gamma)
     F, d = body.deformation_gradient(u), body.dim
     P = np.linalg.det(F)[..., None, None] * s[..., [[0, 3, 5], [3, 1, 4], [5, 4, 2]]] @ np.swapaxes(
         np.linalg.inv(F), -1, -2)

@@ -20,19 +20,24 @@ from ..material import GeneralMaterial
 from ..pattern import Pattern
 from ..space import Space
 from .lanes import J_FLOOR
+from .pieces import pieces
 from .tangent import ERSATZ_STIFFNESS, SOFT_GAMMA
 
 __all__ = ["tangent_general"]
 
 
 def tangent_general(space: Space, pattern: Pattern, material: GeneralMaterial, u: np.ndarray, gamma: np.ndarray,
-                    fibres: np.ndarray, j_bar: bool = True, convex: bool = False) -> np.ndarray:
-    """Data of the tangent on `pattern`, as :func:`.tangent.tangent`; `fibres` (ne, families, 3) are directions."""
-    data = np.zeros(pattern.nnz)
+                    fibres: np.ndarray, j_bar: bool = True, convex: bool = False,
+                    elements: np.ndarray | None = None) -> np.ndarray:
+    """Data of the tangent on `pattern`, as :func:`.tangent.tangent`.
+
+    `fibres` (number of `elements`, families, 3) are directions.
+    """
+    data, x = np.zeros(pattern.nnz), space.X + u
     loop = _tangent_2d if space.dim == 2 else _tangent_3d
-    loop(material.compiled_law, material.constants, material.bulk_modulus, material.shear_modulus, space.conn,
-         space.X + u, space.dN, space.w, np.ascontiguousarray(gamma), np.ascontiguousarray(fibres), j_bar, convex,
-         pattern.slot, data)
+    for conn, dN, w, at_gauss, slot, directions in pieces(space, pattern, gamma, elements, fibres):
+        loop(material.compiled_law, material.constants, material.bulk_modulus, material.shear_modulus, conn, x, dN, w,
+             at_gauss, directions, j_bar, convex, slot, data)
     return data
 
 

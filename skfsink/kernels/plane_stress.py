@@ -23,6 +23,7 @@ from ..pattern import Pattern
 from ..space import Space
 from .force2d import _energy, _gather, _kinematics, _nodal_force, _stress, least_live
 from .lanes import FAST, J_FLOOR, LANES
+from .pieces import pieces
 from .tangent import ERSATZ_STIFFNESS, SOFT_GAMMA
 
 __all__ = ["force_plane_stress", "stiffness_plane_stress", "tangent_plane_stress"]
@@ -131,14 +132,16 @@ def force_plane_stress(law, constants, k_bulk, conn, x, geometry, gamma, j_bar, 
 
 # --- second derivatives ---
 def tangent_plane_stress(space: Space, pattern: Pattern, material: Material, u: np.ndarray, gamma: np.ndarray,
-                         convex: bool = False) -> np.ndarray:
+                         convex: bool = False, elements: np.ndarray | None = None) -> np.ndarray:
     """Data of the tangent on `pattern` at the displacement `u` (n, 2) and Gauss point densities `gamma` (ne, nq).
 
-    Its Gauss points are soft as in :func:`.tangent.tangent`. With `convex` no point is unstable.
+    Its Gauss points are soft as in :func:`.tangent.tangent`. With `convex` no point is unstable. With `elements` it is
+    that of these alone.
     """
-    data = np.zeros(pattern.nnz)
-    _tangent(material.compiled_law, material.constants, material.bulk_modulus, material.shear_modulus, space.conn,
-             space.X + u, space.dN, space.w, np.ascontiguousarray(gamma), convex, pattern.slot, data)
+    data, x = np.zeros(pattern.nnz), space.X + u
+    for conn, dN, w, at_gauss, slot in pieces(space, pattern, gamma, elements):
+        _tangent(material.compiled_law, material.constants, material.bulk_modulus, material.shear_modulus, conn, x, dN,
+                 w, at_gauss, convex, slot, data)
     return data
 
 

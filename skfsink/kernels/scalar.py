@@ -24,8 +24,11 @@ def weighted_mass(space: Space, pattern: Pattern, weight: np.ndarray) -> np.ndar
     return data
 
 
-def mass(space: Space, pattern: Pattern, gamma: np.ndarray, rho0: float) -> np.ndarray:
-    """Data of the consistent mass matrix  int gamma rho0 N_a N_b I  (Eq. 28) on a displacement pattern."""
+def mass(space: Space, pattern: Pattern, gamma: np.ndarray, rho0: float | np.ndarray) -> np.ndarray:
+    """Data of the consistent mass matrix  int gamma rho0 N_a N_b I  (Eq. 28) on a displacement pattern.
+
+    `rho0` [t/mm^3] is a number, or one for each element, (ne, 1).
+    """
     data = np.zeros(pattern.nnz)
     _mass(space.N, space.w, gamma * rho0, space.dim, pattern.slot, data)
     return data

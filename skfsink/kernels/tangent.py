@@ -25,6 +25,7 @@ from numba import njit
 from ..material import Material
 from ..space import Pattern, Space
 from .lanes import J_FLOOR
+from .pieces import pieces
 
 __all__ = ["ERSATZ_STIFFNESS", "SOFT_GAMMA", "tangent"]
 
@@ -33,15 +34,17 @@ SOFT_GAMMA = 1e-3
 
 
 def tangent(space: Space, pattern: Pattern, material: Material, u: np.ndarray, gamma: np.ndarray,
-            j_bar: bool = True, convex: bool = False) -> np.ndarray:
+            j_bar: bool = True, convex: bool = False, elements: np.ndarray | None = None) -> np.ndarray:
     """Data of the tangent on `pattern` at the displacement `u` (n, dim) and Gauss point densities `gamma` (ne, nq).
 
-    With `convex` the pressure in the geometric part is bounded where it would make a Gauss point unstable.
+    With `convex` the pressure in the geometric part is bounded where it would make a Gauss point unstable. With
+    `elements` it is that of these alone.
     """
-    data = np.zeros(pattern.nnz)
+    data, x = np.zeros(pattern.nnz), space.X + u
     loop = _tangent_2d if space.dim == 2 else _tangent_3d
-    loop(material.compiled_law, material.constants, material.bulk_modulus, material.shear_modulus, space.conn,
-         space.X + u, space.dN, space.w, np.ascontiguousarray(gamma), j_bar, convex, pattern.slot, data)
+    for conn, dN, w, at_gauss, slot in pieces(space, pattern, gamma, elements):
+        loop(material.compiled_law, material.constants, material.bulk_modulus, material.shear_modulus, conn, x, dN, w,
+             at_gauss, j_bar, convex, slot, data)
     return data
 
 

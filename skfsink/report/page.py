@@ -152,9 +152,12 @@ def _waves(run: Run) -> tuple[float, float] | None:
     if run.analysis != "dynamic":
         return None
     try:
-        material = run.scene.material
+        parts = run.scene.parts
     except SkfsinkError:  # a mesh file that is gone, for instance
         return None
+    if len(parts) > 1:  # each has its own
+        return None
+    material = parts[0].material
     return material.shear_wave_speed, material.rayleigh_wave_speed
 
 
