@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from bodies import boundary, box, ends, patchy, wavy
+from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from skfsink import stress
@@ -391,6 +392,52 @@ def test_strength_of_the_neo_hookean_solid_in_closed_form():
         assert pytest.approx((1 / (2 * m)) ** (1 / m), rel=1e-6) == peak.W / 0.1686
         assert peak.gamma == pytest.approx(np.exp(-1 / (2 * m)), rel=1e-6)
         assert peak.stress == pytest.approx(1.234 * peak.at * peak.gamma, rel=1e-12)
+
+
+# z = I1' - 3, the factor f in the stress 2 psi' f, and their derivatives, from the stretches alone
+CLOSED_PATHS = {
+    "uniaxial tension": (lambda s: s**2 + 2 / s - 3, lambda s: 2 * s - 2 / s**2, lambda s: s**2 - 1 / s,
+                         lambda s: 2 * s + 1 / s**2),
+    "plane strain": (lambda s: s**2 + s**-2 - 2, lambda s: 2 * s - 2 * s**-3, lambda s: s**2 - s**-2,
+                     lambda s: 2 * s + 2 * s**-3),
+    "equibiaxial tension": (lambda s: 2 * s**2 + s**-4 - 3, lambda s: 4 * s - 4 * s**-5, lambda s: s**2 - s**-4,
+                            lambda s: 2 * s + 4 * s**-5),
+    "simple shear": (lambda k: k**2, lambda k: 2 * k, lambda k: k, lambda k: 1.0),
+}
+CLOSED_LAWS = {  # psi, psi' and psi'' of z, with the default constants
+    "neo-hookean": (lambda z: 0.617 * z, lambda z: 0.617, lambda z: 0.0),
+    "yeoh": (lambda z: 0.298 * z + 0.014 * z**2 + 0.00016 * z**3, lambda z: 0.298 + 0.028 * z + 0.00048 * z**2,
+             lambda z: 0.028 + 0.00096 * z),
+    "gent": (lambda z: -0.27 * 76.5 / 2 * np.log(1 - z / 76.5), lambda z: 0.135 / (1 - z / 76.5),
+             lambda z: 0.135 / 76.5 / (1 - z / 76.5) ** 2),
+}
+
+
+@pytest.mark.parametrize("path", CLOSED_PATHS)
+@pytest.mark.parametrize("name", CLOSED_LAWS)
+def test_strengths_from_closed_forms(name: str, path: str):
+    """Fails if a default constant, an invariant, a stress or a peak is wrong.
+
+    With the stress 2 psi'(z) f exp(-(psi/Phi)^m), its logarithm is stationary where
+    f'/f + psi''/psi' z' = m (psi/Phi)^(m-1) psi'/Phi z'; this root is found here, that of a maximum there.
+    """
+    (psi, d, dd), (z, dz, f, df) = CLOSED_LAWS[name], CLOSED_PATHS[path]
+    phi, m = {"neo-hookean": 0.1686, "yeoh": 82.0, "gent": 15.62}[name], 10.0
+
+    def rise(s: float) -> float:
+        return df(s) / f(s) + (dd(z(s)) / d(z(s)) - m * (psi(z(s)) / phi) ** (m - 1) * d(z(s)) / phi) * dz(s)
+
+    def stored(s: float, share: float) -> float:
+        return psi(min(z(s), 76.0)) - share * phi
+
+    start = PATHS[path].start + 1e-6
+    low, high = (brentq(stored, start, 9.0, (share,)) for share in (0.5, 1.0))
+    at = brentq(rise, low, high, xtol=1e-13)
+    gamma = np.exp(-((psi(z(at)) / phi) ** m))
+    found = peaks(material_from(name), SinkLaw(phi=phi, m=m))[path]
+    assert found.at == pytest.approx(at, rel=1e-7)
+    assert found.gamma == pytest.approx(gamma, rel=1e-6)
+    assert found.stress == pytest.approx(2 * d(z(at)) * f(at) * gamma, rel=1e-10)
 
 
 @pytest.mark.parametrize("name", MATERIALS)

@@ -53,7 +53,8 @@ class HolzapfelGasserOgden(GeneralMaterial):
     slack; its modulus jumps. Beyond k2 E^2 = 40 the energy goes on as a parabola in E, so that it stays finite at
     points that have lost their density. In plane strain the normal is z by default, and the fibres lie in the plane.
 
-    The constants are the authors' for the adventitia of an iliac artery; `axis` is its circumference.
+    The constants are the authors' for the adventitia of an iliac artery; `axis` is its circumference. Some programs
+    take a c that multiplies I1' - 3: theirs is half of this one.
 
     Parameters
     ----------

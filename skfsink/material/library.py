@@ -32,12 +32,12 @@ _TRELOAR = "assumed: strength in uniaxial tension at a stretch of 7.6, where Tre
 LIMITERS: dict[str, Limiter] = {
     "aaa": Limiter(0.1686, 10.0, "the paper, Sec. 4"),
     "neo-hookean": Limiter(0.1686, 10.0, "that of aaa"),
-    "yeoh": Limiter(82.0, 10.0, "Volokh, Mech. Res. Commun. 37 (2010) 684-689"),
+    "yeoh": Limiter(82.0, 10.0, "attributed to Volokh, Mech. Res. Commun. 37 (2010) 684-689, unverified"),
     "mooney-rivlin": Limiter(11.36, 10.0, _TRELOAR),
     "gent": Limiter(15.62, 10.0, _TRELOAR),
     "arruda-boyce": Limiter(13.74, 10.0, _TRELOAR),
-    "hgo": Limiter(0.027, 10.0, "assumed: strength along the axis of 1.03 MPa, as iliac adventitia has in Holzapfel, "
-                   "Sommer and Regitnig, J. Biomech. Eng. 126 (2004) 657-665"),
+    "hgo": Limiter(0.027, 10.0, "assumed: strength along the axis of 1.03 MPa, attributed to iliac adventitia in "
+                   "Holzapfel, Sommer and Regitnig, J. Biomech. Eng. 126 (2004) 657-665, unverified"),
 }
 
 
