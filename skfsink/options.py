@@ -199,6 +199,9 @@ class Options:
     given: Annotated[frozenset[str], Parameter(parse=False)] = frozenset()
 
     def __post_init__(self) -> None:
+        for name in ("out", "resume", "corridor"):
+            if isinstance(folder := getattr(self, name), str):
+                object.__setattr__(self, name, Path(folder))
         require("speed", self.speed, "mm/s", low=0, low_open=True)
         require("tolerance", self.tolerance, low=0, low_open=True)
         choose("quantity", self.quantity, QUANTITIES)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import base64
 import html
+import json
 import re
 import unicodedata
 from pathlib import Path
@@ -50,7 +52,29 @@ def on_files(files: Files, config: Any) -> Files:
         files.append(File.generated(config, f"figures/{path.name}", abs_src_path=str(path)))
     for name, page in OUTSIDE.items():
         files.append(File.generated(config, page, content=(ROOT / name).read_text(encoding="utf-8")))
+    for path in sorted((ROOT / "docs").glob("*.ipynb")):
+        text, pictures = notebook(path)
+        files.append(File.generated(config, f"{path.stem}.md", content=text))
+        for name, picture in pictures.items():
+            files.append(File.generated(config, name, content=picture))
     return files
+
+
+def notebook(path: Path) -> tuple[str, dict[str, bytes]]:
+    """A notebook as a page, with what its cells print, and its pictures by file name."""
+    lines: list[str] = []
+    pictures: dict[str, bytes] = {}
+    for cell in json.loads(path.read_text(encoding="utf-8"))["cells"]:
+        source = "".join(cell["source"])
+        lines += [source, ""] if cell["cell_type"] == "markdown" else ["```python", source, "```", ""]
+        for output in cell.get("outputs", []):
+            if text := "".join(output.get("text", [])):
+                lines += ["```text", text.rstrip(), "```", ""]
+            if picture := output.get("data", {}).get("image/png"):
+                name = f"{path.stem}_{len(pictures)}.png"
+                pictures[name] = base64.b64decode("".join(picture))
+                lines += [f"![]({name})", ""]
+    return "\n".join([*lines, f"This page is the notebook [{path.name}]({path.name})."]), pictures
 
 
 def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
