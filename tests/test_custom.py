@@ -218,3 +218,13 @@ def test_sets_of_nodes_and_elements_are_found_in_mesh_files(suffix: str, tmp_pat
     sample = file_sample(path)
     assert (sample.nodes("lid") == end).all()
     assert (sample.elements("half") == right).all()
+
+
+def test_report_of_a_custom_scene(folder: Path) -> None:
+    """Fails if a report cannot be made of it, names it by its kind, or shows tables as they are in the program."""
+    assert invoke_program("run", deck(folder, HEAD + 'title = "My plate"\n' + GRIPS), "--out", "run", "--quiet")[0] == 0
+    assert invoke_program("report", "run")[0] == 0
+    page = (folder / "run" / "report.html").read_text(encoding="utf-8")
+    assert "My plate, mesh plate, dynamic (explicit)" in page
+    assert "boundary top, x 0, y 0.001; boundary bottom, x 0, y -0.001" in page
+    assert "skfsink run run/scene.toml --out FOLDER" in page and "&#39;boundary" not in page

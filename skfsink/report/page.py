@@ -116,11 +116,16 @@ def report_page(asked: Sequence[Run]) -> str:
 
 
 def _title(asked: Sequence[Run]) -> str:
-    names = list(dict.fromkeys(run.case.replace("_", " ") for run in asked))
+    names = list(dict.fromkeys(_named(run) for run in asked))
     if len(asked) > 1:
         return f"{len(asked)} runs compared: {', '.join(names)}"
     run = asked[0]
-    return f"{names[0].capitalize()}, mesh {Path(str(run.parameters.get('mesh', ''))).stem}, {_kind(run)}"
+    return f"{names[0][0].upper()}{names[0][1:]}, mesh {Path(str(run.parameters.get('mesh', ''))).stem}, {_kind(run)}"
+
+
+def _named(run: Run) -> str:
+    """The case, or the title of a scene of one's own."""
+    return str(run.parameters.get("title") or run.case.replace("_", " "))
 
 
 def _kind(run: Run) -> str:
@@ -134,7 +139,7 @@ def _part(run: Run, label: str, several: bool) -> Part:
     pictures = {title: _picture(run.folder / name, title, lead + alt) for name, title, alt in PICTURES}
     choice = run.summary.get("model") or run.choice
     rows = tuple(Row(name.replace("_", " "), "", (_flat(value),)) for name, value in choice.items() if name != "text")
-    return Part(label, f"{run.case.replace('_', ' ')}, mesh {run.parameters.get('mesh', EMPTY)}, {_kind(run)}",
+    return Part(label, f"{_named(run)}, mesh {run.parameters.get('mesh', EMPTY)}, {_kind(run)}",
                 _note(run), {title: picture for title, picture in pictures.items() if picture}, tuple(run.warnings),
                 run.assumed, rows, str(choice.get("text", "")), parameter_table(run), command_line(run), run.finished)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import inspect
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import fields
 from typing import Any
@@ -14,6 +14,7 @@ import docstring_parser
 
 from ..loader import Run
 from ..options import Options
+from ..tables import TABLES
 from .tables import EMPTY, Row, Table
 
 __all__ = ["command_line", "differences", "meanings", "parameter_table", "run_labels"]
@@ -22,12 +23,16 @@ _LABELS = {"dynamic": "dynamic", "quasistatic": "quasi-static"}
 
 
 def _shown(value: Any) -> str:
-    return EMPTY if value is None else "yes" if value is True else "no" if value is False else \
+    if isinstance(value, Mapping):  # a grip, a traction, a region
+        return ", ".join(f"{name} {_shown(item)}" for name, item in value.items())
+    if isinstance(value, list | tuple):
+        return "; ".join(map(_shown, value)) or EMPTY
+    return EMPTY if value in (None, "") else "yes" if value is True else "no" if value is False else \
         f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def _defaults(case: str) -> dict[str, Any]:
-    options = {f.name: getattr(Options(), f.name) for f in fields(Options)}
+    options = {**{f.name: getattr(Options(), f.name) for f in fields(Options)}, **Options().parameters()}
     try:
         function = getattr(importlib.import_module(f"skfsink.cases.{case}"), case)
     except (ImportError, AttributeError):
@@ -52,7 +57,7 @@ def parameter_table(run: Run) -> Table:
     """All parameters of a run beside their defaults."""
     defaults, said = _defaults(run.case), meanings(run.case)
     rows = tuple(Row(name, said.get(name, ""), (
-        _shown(value), _shown(defaults[name]) if name in defaults and defaults[name] != value else ""))
+        _shown(value), _shown(defaults[name]) if name not in TABLES and defaults.get(name, value) != value else ""))
         for name, value in run.parameters.items())
     return Table("Parameters", ("value", "default, where it differs"), rows)
 
@@ -72,7 +77,9 @@ def differences(runs: Sequence[Run], labels: Sequence[str]) -> Table:
 
 
 def command_line(run: Run) -> str:
-    """The command that computes the run again: all parameters that are not the defaults."""
+    """The command that computes the run again: all parameters that are not the defaults, or the deck it has left."""
+    if run.case == "custom":
+        return shlex.join(["skfsink", "run", str(run.folder / "scene.toml"), "--out", "FOLDER"])
     defaults = _defaults(run.case)
     words = []
     for name, value in run.parameters.items():
