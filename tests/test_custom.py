@@ -9,12 +9,14 @@ from typing import Any
 import meshio
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 from plates import contents, invoke_program, plate
 
 import skfsink.run
 from skfsink.cases.custom import _scene, custom
 from skfsink.deck import read_deck
-from skfsink.errors import MeshError, ParameterError
+from skfsink.errors import MeshError, ParameterError, SkfsinkError
 from skfsink.loads import Grip, Ramp, Traction
 from skfsink.material import LIMITERS, MATERIALS, Gent, HolzapfelGasserOgden, constants_text, read_constants
 from skfsink.meshing import write_mesh
@@ -228,3 +230,51 @@ def test_report_of_a_custom_scene(folder: Path) -> None:
     assert "My plate, mesh plate, dynamic (explicit)" in page
     assert "boundary top, x 0, y 0.001; boundary bottom, x 0, y -0.001" in page
     assert "skfsink run run/scene.toml --out FOLDER" in page and "&#39;boundary" not in page
+
+
+# --- hostile tables ---
+ODD = st.one_of(st.integers(-2**60, 2**60), st.floats(), st.booleans(), st.text(max_size=12), st.sampled_from(
+    [0, 0.0, 1e-3, "1e-3 mm/s", "1 MPa", "5 s", "top", "left", "half", "gent", "mu = 1 MPa", "steel", "1 kPa/s"]))
+RAMPS = st.lists(st.one_of(ODD, st.lists(ODD, max_size=3)), max_size=4)
+KEYS = st.sampled_from(["boundary", "x", "y", "z", "name", "material", "constants", "phi", "m", "density",
+                        "bulk_modulus", "", "w"])
+ENTRIES = st.lists(st.one_of(ODD, st.dictionaries(KEYS, st.one_of(ODD, RAMPS), max_size=5),
+                             st.fixed_dictionaries({"boundary": st.sampled_from(["top", "bottom", "nowhere"])},
+                                                   optional={"x": st.one_of(ODD, RAMPS), "y": st.one_of(ODD, RAMPS)}),
+                             st.fixed_dictionaries({"name": st.just("half")}, optional={
+                                 "material": ODD, "constants": ODD, "phi": ODD, "m": ODD, "density": ODD})), max_size=3)
+DECKS = st.fixed_dictionaries({}, optional={"grips": st.one_of(ODD, ENTRIES), "tractions": st.one_of(ODD, ENTRIES),
+                                            "regions": st.one_of(ODD, ENTRIES), "loads": ENTRIES})
+FEW = settings(max_examples=300, deadline=None, database=None, suppress_health_check=list(HealthCheck))
+
+
+def check_tables(folder: Path, tables: dict[str, Any]) -> None:
+    """A deck of these tables makes a scene, or is refused in one line; nothing is written beside it."""
+    if not (folder / "half.vtu").exists():
+        mesh = plate()
+        middle = mesh.points[mesh.cells_dict["quad"]].mean(axis=1)
+        mesh.cell_sets["half"] = [np.flatnonzero(middle[:, 0] > 2.0), np.zeros(0, int)]
+        write_mesh(folder / "half.vtu", mesh)
+    text = tomllib_text({"case": "custom", "parameters": {"mesh": "half.vtu"}, **tables})
+    path, before = deck(folder, text), sorted(folder.iterdir())
+    try:
+        own, options = read_deck(path).check()
+        _scene({"title": "", "faces": "", "grips": (), "tractions": (), "regions": (), **own}, options)
+    except SkfsinkError as error:
+        assert len(str(error).splitlines()) == 1 and len(str(error)) < 700
+    assert sorted(folder.iterdir()) == before
+
+
+@FEW
+@given(DECKS)
+def test_any_tables(folder: Path, tables: dict[str, Any]) -> None:
+    """Fails if tables of any kind give anything but a scene or one line."""
+    check_tables(folder, tables)
+
+
+@pytest.mark.slow
+@settings(FEW, max_examples=5000)
+@given(DECKS)
+def test_five_thousand_tables(folder: Path, tables: dict[str, Any]) -> None:
+    """Fails as the test before, on more of them."""
+    check_tables(folder, tables)
