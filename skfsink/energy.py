@@ -8,7 +8,7 @@ mass that disappears:
 The ledger keeps D in its two parts beside the energy of the paper, U = sum over failed elements of A_i psi_f
 (Eq. 30, 32), which is a measure of the failed area and does not enter the balance:
 
-    elastic + kinetic + D + deletion + numerical + released = initial + external work.
+    elastic + loads + kinetic + D + deletion + numerical + released = initial + external work.
 
 Every entry is computed from its own definition; none is what is left over from the others.
 """
@@ -28,10 +28,11 @@ class Ledger:
 
     Attributes
     ----------
-    initial: elastic energy at the start of the ledger.
+    initial: elastic and kinetic energy, and potential of the dead loads, at the start of the ledger.
     elastic: gamma-weighted stored energy.
+    loads: potential -f.u of the dead loads.
     kinetic: gamma-weighted kinetic energy.
-    work: work of the grips.
+    work: work of the grips, and -u.df of dead loads f that change.
     sink_stored, sink_kinetic: the two parts of D.
     deletion: stored and kinetic energy of elements at the moment they were deleted.
     numerical: dissipation of the scheme, from its own identity (negative: it fed energy in).
@@ -41,6 +42,7 @@ class Ledger:
 
     initial: float = 0.0
     elastic: float = 0.0
+    loads: float = 0.0
     kinetic: float = 0.0
     work: float = 0.0
     sink_stored: float = 0.0
@@ -58,7 +60,7 @@ class Ledger:
     @property
     def balance(self) -> float:
         """What does not close: left side minus right side of the balance."""
-        return (self.elastic + self.kinetic + self.sink + self.deletion + self.numerical + self.released
+        return (self.elastic + self.loads + self.kinetic + self.sink + self.deletion + self.numerical + self.released
                 - self.initial - self.work)
 
     def error(self, scale: float) -> float:

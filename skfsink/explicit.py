@@ -2,7 +2,9 @@
 
 Velocity form of the scheme, for the free degrees of freedom:
 
-    u_{n+1} = u_n + dt (v_n + dt/2 a_n),   m a_{n+1} = -f(u_{n+1}),   v_{n+1} = v_n + dt/2 (a_n + a_{n+1}).
+    u_{n+1} = u_n + dt (v_n + dt/2 a_n),   m a_{n+1} = -f(u_{n+1}),   v_{n+1} = v_n + dt/2 (a_n + a_{n+1}),
+
+with f the internal force less the dead loads.
 
 gamma multiplies stiffness and mass alike, so damage does not lower the stable step. Every few steps gamma is
 solved anew; accelerations are kept when the mass changes with it.
@@ -11,8 +13,8 @@ With V the mean velocity of a step and f_n = -m a_n, the scheme obeys, exactly,
 
     K_{n+1} - K_n = - (f_n + f_{n+1})/2 . (u_{n+1} - u_n) + dt^2/8 (f_{n+1}.m^-1 f_{n+1} - f_n.m^-1 f_n),
 
-so the dissipation it adds is the difference between that trapezoidal work and the change of stored energy at fixed
-gamma, less the last term: that is what the ledger books as numerical.
+so the dissipation it adds is the difference between that trapezoidal work (with that of the dead loads taken back) and
+the change of stored energy at fixed gamma, less the last term: that is what the ledger books as numerical.
 """
 
 from __future__ import annotations
@@ -28,6 +30,7 @@ from .deletion import delete_failed, left_in
 from .density import DensitySolver
 from .direct import symmetric_product
 from .errors import InstabilityError, require
+from .loading import Loading
 from .momentum import Momentum
 from .space import Pattern
 from .state import State
@@ -90,13 +93,15 @@ class Explicit:
     ----------
     momentum, density: the two fields.
     free: (n*dim,) mask of the degrees of freedom that are not held by a grip.
-    grip_velocity: (n, dim) velocity of the held ones [mm/s], zero elsewhere.
+    motion: of the held ones, as a :class:`.Loading`, or as their velocity (n, dim) [mm/s], zero elsewhere. Where a ramp
+        has a knot a step ends.
     controls: options.
     deletion: gamma at which an element fails.
 
     Attributes
     ----------
-    dt: the current step [s].   estimates: frequency estimates made.   reaction: (n, dim) internal force.
+    dt: the current step [s].   estimates: frequency estimates made.
+    reaction: (n, dim) internal force less the dead loads.
     """
 
     GAMMA_INTERVAL = 0.03  # l/c_s between solves for gamma; the crack then runs less than 3 % of l
@@ -107,14 +112,15 @@ class Explicit:
     FALLEN = 100     # steps after which a fallen one does; until then the step is shorter than it need be
     FED_IN = 1e-6    # energy a step may feed in before omega_max is estimated at once, of the initial energy
 
-    def __init__(self, momentum: Momentum, density: DensitySolver, free: np.ndarray, grip_velocity: np.ndarray,
+    def __init__(self, momentum: Momentum, density: DensitySolver, free: np.ndarray, motion: np.ndarray | Loading,
                  controls: ExplicitControls | None = None, deletion: float = 1e-6) -> None:
         self.momentum, self.density, self.deletion = momentum, density, deletion
         self.controls = controls or ExplicitControls()
         self.space = momentum.space
         self.free = free
         self._free = np.ascontiguousarray(free.reshape(-1, self.space.dim))
-        self._grip_velocity = grip_velocity
+        self.loading = Loading.of(self.space, free, motion)
+        self._grip_velocity, self._knot = self.loading.velocity(0.0), np.inf
         self._pattern = Pattern(self.space, self.space.dim, free, upper=True)
         self._mass_floor = max(self.controls.mass_floor, 1e-12)  # a node without mass or force stays where it is
         self.dt = 0.0
@@ -128,6 +134,8 @@ class Explicit:
 
     def start(self, state: State) -> None:
         """Forces, masses and accelerations of `state`; to be called once before stepping, and after a resume."""
+        self.momentum.set_time(state.grip)
+        self._grip_velocity, self._knot = self.loading.velocity(state.grip), self.loading.knot(state.grip)
         self.momentum.set_gamma(state.gamma, state.deleted)
         self.mass = self.momentum.lumped_mass(self._mass_floor)
         self.reaction = self.momentum.force(state.u)
@@ -142,8 +150,8 @@ class Explicit:
         np.copyto(state.v, self._grip_velocity, where=~self._free)
         state.a[...] = np.where(self._free, -self.reaction / self.mass[:, None], 0.0)
         state.ledger.initial = state.ledger.elastic = self._elastic
-        state.ledger.kinetic = self._kinetic(state)
-        state.ledger.initial += state.ledger.kinetic
+        state.ledger.kinetic, state.ledger.loads = self._kinetic(state), self.momentum.loads
+        state.ledger.initial += state.ledger.kinetic + state.ledger.loads
 
     def _kinetic(self, state: State) -> float:
         return float(self.mass @ _half_square(state.v))
@@ -159,8 +167,11 @@ class Explicit:
         """One time step, with the solve for gamma when it is due."""
         if self._mode is None or self._urgent or state.step % self.CHECK == 0:
             self._set_step(state)
-        dt = self.dt
-        old = self.reaction
+        dt, grip, dead = self.dt, state.grip + self.dt, self.momentum.dead
+        if grip >= self._knot:
+            dt, grip = self._knot - state.grip, self._knot
+        old, before = self.reaction, None if dead is None else dead.values
+        self.momentum.set_time(grip)
         du = _move(state.u, state.v, state.a, self._free, self._grip_velocity, dt)
         force = self.momentum.force(state.u, self._spare)
         np.maximum(self._W_max, self._W, out=self._W_max)
@@ -168,16 +179,22 @@ class Explicit:
         self.reaction, self._spare = force, old
         ledger = state.ledger
         elastic = self.momentum.energy
-        fed = dt * dt / 8 * swing + (elastic - self._elastic) - trapezoid
+        fed, scale = dt * dt / 8 * swing + (elastic - self._elastic) - trapezoid, ledger.initial
+        if dead is not None and before is not None:
+            fed -= dead.effort(before, du)
+            ledger.work += dead.changed(before, state.u - 0.5 * du)
+            ledger.loads, scale = self.momentum.loads, max(abs(scale), elastic + kinetic)
         ledger.numerical -= fed
-        if fed > self.FED_IN * ledger.initial:  # first sign of a step that has become too long
+        if fed > self.FED_IN * scale:  # first sign of a step that has become too long
             self._urgent = True
         ledger.work += held
         ledger.elastic = self._elastic = elastic
         ledger.kinetic = kinetic
         state.time += dt
-        state.grip += dt
+        state.grip = grip
         state.step += 1
+        if grip == self._knot:
+            self._turn(state)
         self._since_gamma += 1
         if self._since_gamma >= self._gamma_every:
             self._since_gamma = 0
@@ -185,6 +202,14 @@ class Explicit:
         if state.step % 100 == 0 and not np.isfinite(kinetic + elastic):
             raise InstabilityError(f"the explicit integration blew up at t = {state.time:.4g} s (step {state.step}): "
                                    f"lower courant, now {self.controls.courant:g}")
+
+    def _turn(self, state: State) -> None:
+        """At a knot: grips take their new velocities at once; what that needs is their work."""
+        self._grip_velocity, self._knot = self.loading.velocity(state.grip), self.loading.knot(state.grip)
+        before = state.ledger.kinetic
+        np.copyto(state.v, self._grip_velocity, where=~self._free)
+        state.ledger.kinetic = self._kinetic(state)
+        state.ledger.work += state.ledger.kinetic - before
 
     def update_density(self, state: State) -> None:
         """Solve for gamma from the history, book what the sink takes, delete failed elements."""
@@ -196,12 +221,16 @@ class Explicit:
             return
         failed = delete_failed(self.space, state, self.deletion, self.density.failure_energy)
         left = left_in(momentum, state.gamma, failed) if failed.size else 0.0
+        dead, before = momentum.dead, None if momentum.dead is None else momentum.dead.values
         stored = momentum.set_gamma(state.gamma, state.deleted)
         mass, self.mass = self.mass, momentum.lumped_mass(self._mass_floor)
         ledger.sink_stored += stored - left
         ledger.deletion += left
         half_v2 = _half_square(state.v)
         ledger.sink_kinetic += float((mass - self.mass) @ half_v2)
+        if dead is not None and before is not None:
+            ledger.work += dead.changed(before, state.u)
+            ledger.loads = dead.potential(state.u)
         self._elastic -= stored
         ledger.elastic = self._elastic
         ledger.kinetic = float(self.mass @ half_v2)

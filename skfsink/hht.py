@@ -1,6 +1,6 @@
 """Implicit Hilber-Hughes-Taylor integration (Eq. 25-29), with adaptive steps.
 
-    M a_{n+1} + (1 + alpha) F_{n+1} - alpha F_n = 0,
+    M a_{n+1} + (1 + alpha) F_{n+1} - alpha F_n = 0,        F: internal force less the dead loads,
     u_{n+1} = u_n + dt v_n + dt^2 [(1/2 - beta) a_n + beta a_{n+1}],
     v_{n+1} = v_n + dt [(1 - g) a_n + g a_{n+1}],       beta = (1 - alpha)^2/4,  g = 1/2 - alpha.
 
@@ -28,6 +28,7 @@ from .direct import Factorization
 from .errors import ConvergenceError
 from .hht_controls import HHTControls
 from .inertia import Inertia
+from .loading import Loading
 from .momentum import Momentum
 from .pattern import Pattern
 from .state import State
@@ -54,13 +55,14 @@ class HHT:
     ----------
     momentum, density: the two fields.
     free: (n*dim,) mask of the degrees of freedom that no grip holds.
-    grip_velocity: (n, dim) velocity of the held ones [mm/s].
+    motion: of the held ones, as a :class:`.Loading`, or as their velocity (n, dim) [mm/s]. Where a ramp has a knot a
+        step ends.
     deletion: gamma at which an element fails.
 
     Attributes
     ----------
     dt: size of the next step [s].   rejected: steps given up.   iterations: Newton iterations made.
-    reaction: (n, dim) internal force of the last accepted state.
+    reaction: (n, dim) internal force of the last accepted state, less the dead loads.
     loading: in loading, steps are long, and near the limit load what takes iterations is that gamma follows slowly:
         factors are kept for it, and a step in which it runs away is cut at once, without a warning.
     """
@@ -70,14 +72,15 @@ class HHT:
     GROW = 1.5
     LEAST_J = 0.02
 
-    def __init__(self, momentum: Momentum, density: DensitySolver, free: np.ndarray, grip_velocity: np.ndarray,
+    def __init__(self, momentum: Momentum, density: DensitySolver, free: np.ndarray, motion: np.ndarray | Loading,
                  controls: HHTControls | None = None, deletion: float = 1e-6, threads: int = 1) -> None:
         self.momentum, self.density, self.deletion = momentum, density, deletion
         self.controls = controls or HHTControls()
         self.space = momentum.space
         self.free = free
         self._held = ~free.reshape(-1, self.space.dim)
-        self._grip_velocity = grip_velocity
+        self._motion = Loading.of(self.space, free, motion)
+        self._grip_velocity, self._knot = self._motion.velocity(0.0), np.inf
         self._pattern = Pattern(self.space, self.space.dim, free, upper=True)
         self.inertia = Inertia(momentum, self._pattern, free, self.controls.mass, self.controls.mass_floor)
         self.solver = Factorization(self._pattern, threads=threads)
@@ -94,8 +97,11 @@ class HHT:
 
     def start(self, state: State) -> None:
         """Forces and masses of `state`; after a resume :meth:`restore` does it."""
+        self.momentum.set_time(state.grip)
+        self._grip_velocity, self._knot = self._motion.velocity(state.grip), self._motion.knot(state.grip)
         self.momentum.set_gamma(state.gamma, state.deleted)
         self.reaction = self.momentum.force(state.u)
+        self._loads = self._dead_loads
         self._W = self.momentum.W
         self._gamma = self.momentum.gamma
         self._mass, self._places = self.inertia.matrix(), self.inertia.places()
@@ -110,7 +116,8 @@ class HHT:
         state.a.reshape(-1)[self.free] = self.solver.solve(self._inertia)
         state.ledger.elastic = self.momentum.energy
         state.ledger.kinetic = self.inertia.kinetic(self._mass, state.v)
-        state.ledger.initial = state.ledger.elastic + state.ledger.kinetic
+        state.ledger.loads = self.momentum.loads
+        state.ledger.initial = state.ledger.elastic + state.ledger.kinetic + state.ledger.loads
 
     def run(self, state: State, t_end: float) -> Iterator[State]:
         """Step until `t_end` [s], yielding the state after each accepted step."""
@@ -129,16 +136,18 @@ class HHT:
         if self.controls.coupling == "single":
             self._damage(state)
         while True:
-            trial, iterations = self._attempt(state, self.dt)
+            end = min(state.grip + self.dt, self._knot)
+            dt = self.dt if end < self._knot else end - state.grip
+            trial, iterations = self._attempt(state, dt, end)
             if trial is not None:
                 break
             self.rejected += 1
-            self.dt *= 0.5
+            self.dt = 0.5 * dt
             if self.dt < self.controls.dt_least:
                 raise ConvergenceError(f"the implicit integration stalled at t = {state.time:.4g} s: no step down to "
                                        f"{self.controls.dt_least:.1g} s converges; lower --hht-dt (now "
                                        f"{self.controls.dt:g} s), or take --integrator explicit")
-        self._accept(state, trial, self.dt)
+        self._accept(state, trial, dt, end)
         if iterations <= self.controls.max_iterations // 2:
             self.dt = min(self.dt * self.GROW, self.controls.dt)
 
@@ -146,7 +155,9 @@ class HHT:
         """Single pass: bring gamma up to the history of the accepted state, at fixed displacement and velocity."""
         momentum, ledger = self.momentum, state.ledger
         state.gamma = self.density.solve(state.W_max, state.gamma)
+        momentum.set_time(state.grip)
         momentum.set_gamma(state.gamma, state.deleted)
+        self._book_loads(state)
         ledger.drop(self.space.w, self._W, self._gamma, momentum.gamma)
         masses = self.inertia.places()
         ledger.sink_kinetic += float(np.vdot(self._places - masses, self.inertia.half_v2(state.v)))
@@ -155,10 +166,21 @@ class HHT:
         self.reaction = momentum.force(state.u)
         self._inertia = self.inertia.times(self._mass, state.a.ravel()[self.free])
 
-    def _attempt(self, state: State, dt: float) -> tuple[_Trial | None, int]:
+    @property
+    def _dead_loads(self) -> np.ndarray | None:
+        return None if self.momentum.dead is None else self.momentum.dead.values
+
+    def _book_loads(self, state: State) -> None:
+        """Work of the dead loads that have changed at fixed displacement, as where elements under them are gone."""
+        if self.momentum.dead is not None and self._loads is not None:
+            state.ledger.work += self.momentum.dead.changed(self._loads, state.u)
+            self._loads = self.momentum.dead.values
+
+    def _attempt(self, state: State, dt: float, end: float) -> tuple[_Trial | None, int]:
         c, momentum = self.controls, self.momentum
         free = self.free
         gamma = state.gamma
+        momentum.set_time(end)
         momentum.set_gamma(gamma, state.deleted)
         mass = self.inertia.matrix()
         shape = state.u.shape
@@ -228,7 +250,7 @@ class HHT:
     def _volume(self) -> np.ndarray:
         return self.density.load
 
-    def _accept(self, state: State, trial: _Trial, dt: float) -> None:
+    def _accept(self, state: State, trial: _Trial, dt: float, end: float) -> None:
         c, ledger, free, momentum = self.controls, state.ledger, self.free, self.momentum
         g = c.newmark_gamma
         gamma_new = momentum.gamma
@@ -263,6 +285,10 @@ class HHT:
         held = float(work[self._held].sum())
         ledger.numerical += held - stored - motion
         ledger.work += held
+        if momentum.dead is not None and self._loads is not None:
+            ledger.numerical += momentum.dead.effort(self._loads, du)
+            ledger.work += momentum.dead.changed(self._loads, state.u + 0.5 * du)
+            self._loads = momentum.dead.values
         # commit
         self._rate = du / dt
         state.u, state.gamma = trial.u, trial.gamma
@@ -270,11 +296,12 @@ class HHT:
         state.v.reshape(-1)[free] = v1
         state.W_max = np.maximum(state.W_max, trial.W)
         state.time += dt
-        state.grip += dt
+        state.grip = end
         state.step += 1
         before = gamma_new
         if delete_failed(self.space, state, self.deletion, self.density.failure_energy).size:
             momentum.set_gamma(state.gamma, state.deleted)
+            self._book_loads(state)
             ledger.deletion += float(np.einsum("eq,eq,eq->", w, before - momentum.gamma, trial.W))
         self._mass, self._places = self.inertia.matrix(), self.inertia.places()
         moving = self.inertia.kinetic(trial.mass, state.v)
@@ -285,7 +312,10 @@ class HHT:
         ledger.deletion += moving - kinetic  # with what the mass floor of dead nodes still had
         ledger.kinetic = kinetic
         self.reaction = momentum.force(state.u)
-        ledger.elastic = momentum.energy
+        ledger.elastic, ledger.loads = momentum.energy, momentum.loads
+        if end == self._knot:
+            self._grip_velocity, self._knot = self._motion.velocity(end), self._motion.knot(end)
+            state.v[self._held] = self._grip_velocity[self._held]
         self._inertia, self._W, self._gamma = inertia, momentum.W, momentum.gamma
 
     def sync(self, state: State) -> None:

@@ -24,8 +24,9 @@ HISTORY_COLUMNS: dict[str, str] = {
     "grip_displacement_mm": "displacement of a grip",
     "reaction_N_per_mm": "force on a grip along its motion",
     "elastic": "gamma-weighted stored energy",
+    "loads": "potential of the dead loads",
     "kinetic": "gamma-weighted kinetic energy",
-    "work": "work of the grips",
+    "work": "work of the grips, and of dead loads that change",
     "sink_stored": "stored energy taken by the sink, the first part of D",
     "sink_kinetic": "kinetic energy taken by the sink, the second part of D",
     "deletion": "energy left in elements when they were deleted",
@@ -44,8 +45,9 @@ HISTORY_COLUMNS: dict[str, str] = {
     "gamma_min": "least relative density of a node",
     "dt_s": "time step",
 }
-_ENERGIES = ("elastic", "kinetic", "work", "sink_stored", "sink_kinetic", "deletion", "numerical", "released",
-             "U_paper", "balance")
+_LATER = ("loads",)  # columns that files of before have not; they are 0 there
+_ENERGIES = ("elastic", "loads", "kinetic", "work", "sink_stored", "sink_kinetic", "deletion", "numerical",
+             "released", "U_paper", "balance")
 _SUFFIX = {"s": "_s", "mm": "_mm", "m/s": "_m_per_s", "N/mm": "_N_per_mm", "N": "_N", "N mm/mm": "_N_mm_per_mm",
            "N mm": "_N_mm", "1": "", "": ""}
 _COUNTS = ("step", "tips", "branches", "deleted_elements")
@@ -106,7 +108,7 @@ class History:
         write_atomic(self.path, _csv([history_header(dim), *(row.values() for row in self.rows)]))
 
     def append(self, row: Mapping[str, Any]) -> None:
-        """Add a row. Columns that it leaves out are NaN, counts are 0; an unknown column is a KeyError."""
+        """Add a row. Columns that it leaves out are NaN, counts and loads are 0; an unknown column is a KeyError."""
         self.rows.append(_row(row))
         with reported(f"cannot write {self.path}"), open(self.path, "a", encoding="utf-8", newline="") as file:
             file.write(_csv([self.rows[-1].values()]))
@@ -130,19 +132,30 @@ class History:
             text = Path(path).read_text(encoding="utf-8", errors="replace")
         try:
             header, *lines = csv.reader(text[:text.rfind("\n") + 1].splitlines())
-            dim = next((d for d in (2, 3) if header == history_header(d)), 0)
-            if not dim and header != list(HISTORY_COLUMNS):
-                raise ValueError
-            columns = _columns({name: [line[i] for line in lines] for i, name in enumerate(HISTORY_COLUMNS)})
+            known, dim = _known(header)
+            values = {name: [line[i] for line in lines] for i, name in enumerate(known)}
+            columns = _columns({name: values.get(name, ["0"] * len(lines)) for name in HISTORY_COLUMNS})
         except (IndexError, ValueError) as error:
             raise OutputError(f"{path} is not a history file of skfsink, or is damaged") from error
         return Table(columns, dim or (3 if np.isfinite(columns["tip_z_mm"]).any() else 2))
 
 
+def _known(header: list[str]) -> tuple[list[str], int]:
+    """Columns of a file by its header, and the dimensions of its body, 0 if it does not tell; ValueError else."""
+    for left_out in ((), _LATER):
+        known = [name for name in HISTORY_COLUMNS if name not in left_out]
+        for dim in (2, 3):
+            if header == [column for name, column in zip(HISTORY_COLUMNS, history_header(dim)) if name in known]:
+                return known, dim
+        if header == known:
+            return known, 0
+    raise ValueError
+
+
 def _row(values: Mapping[str, Any]) -> dict[str, Any]:
     if unknown := values.keys() - HISTORY_COLUMNS.keys():
         raise KeyError(f"the history has no column {', '.join(sorted(unknown))}")
-    return {name: kind(values.get(name, _MISSING[kind])) for name, kind in _KIND.items()}
+    return {name: kind(values.get(name, 0.0 if name in _LATER else _MISSING[kind])) for name, kind in _KIND.items()}
 
 
 def _csv(rows: Sequence[Any]) -> str:

@@ -26,7 +26,7 @@ class Ramp:
     Raises
     ------
     ParameterError
-        Fewer than two points, or times that do not ascend.
+        Fewer than two points, times that do not ascend, or a value other than 0 at time 0.
     """
 
     times: tuple[float, ...]
@@ -42,6 +42,8 @@ class Ramp:
             require("ramp time", time, "s", low=0)
         if not (np.diff(self.times) > 0).all():
             raise ParameterError(f"the times of a ramp must ascend; got {', '.join(f'{t:g}' for t in self.times)}")
+        if self.times[0] == 0.0 and self.values[0] != 0.0:
+            raise ParameterError(f"a ramp must be 0 at time 0; got {self.values[0]:g}: let it rise from 0")
         if self.times[0] > 0.0:
             object.__setattr__(self, "times", (0.0, *self.times))
             object.__setattr__(self, "values", (0.0, *self.values))

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from . import kernels
+from .dead_load import DeadLoad
 from .errors import ParameterError
 from .material import GeneralMaterial, Material
 from .pattern import Pattern
@@ -51,6 +52,8 @@ class Momentum:
     rho0: density of the intact solid [t/mm^3], a number, or where materials differ one for each element (ne, 1).
     shear_moduli, shear_wave_speeds: least and greatest of the materials [MPa; m/s].
     energy: gamma-weighted stored energy at the last evaluation [N mm; N mm/mm in 2D].
+    dead: dead loads, if there are any, at the load time last given to :meth:`set_time`; `force` is less them.
+    loads: their potential -f.u at the last evaluation, in the same units.
     least_J: least J (plane stress: its part in the plane) at a Gauss point with gamma > 0 at the last evaluation.
     evaluations: how often the force was evaluated.
     """
@@ -72,7 +75,8 @@ class Momentum:
         self.shear_moduli, self.shear_wave_speeds = (min(moduli), max(moduli)), (min(speeds), max(speeds))
         rho0 = by_element(space.n_elements, material.rho0, regions, lambda region: region.material.rho0)
         self.rho0 = rho0[:, None] if isinstance(rho0, np.ndarray) else rho0
-        self.energy = 0.0
+        self.energy = self.loads = 0.0
+        self.dead: DeadLoad | None = None
         self.least_J = 1.0
         self.evaluations = 0
         self._intact = self._lumped(np.ones_like(space.w))
@@ -119,13 +123,32 @@ class Momentum:
         Returns the energy [N mm; N mm/mm in 2D] that its fall takes from the stored energy last evaluated.
         """
         self._gamma = None
+        if self.dead is not None:
+            nodes, e = self.space.conn[self.dead.elements], self.dead.elements
+            self.dead.keep(((gamma[nodes] @ self.space.N.T >= self.force_floor) & ~deleted[e, None]).any(axis=1))
         return self.tiles.relax(gamma, deleted, self.force_floor)
 
+    def set_time(self, t: float) -> None:
+        """Use the dead loads of load time `t` [s] from now on."""
+        if self.dead is not None:
+            self.dead.at(t)
+
+    @property
+    def potential(self) -> float:
+        """Stored energy and potential of the dead loads at the last evaluation: `force` is its derivative."""
+        return self.energy + self.loads
+
     def force(self, u: np.ndarray, out: np.ndarray | None = None) -> np.ndarray:
-        """Internal force at the displacement `u`, (n, dim) [N; N/mm in 2D]. Sets `energy`, `least_J` and `W`."""
+        """Internal force at the displacement `u` less the dead loads, (n, dim) [N; N/mm in 2D].
+
+        Sets `energy`, `loads`, `least_J` and `W`.
+        """
         out = np.empty_like(self.space.X) if out is None else out
         self.least_J = self.tiles.force(self.space.X + u, self._laws, out, self.j_bar)
         self.energy = float(self.tiles.psi.sum())
+        if self.dead is not None:
+            out[self.dead.nodes] -= self.dead.values
+            self.loads = self.dead.potential(u)
         self.evaluations += 1
         return out
 

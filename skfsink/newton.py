@@ -20,13 +20,13 @@ __all__ = ["Newton"]
 
 
 class Newton:
-    """Finds displacements in equilibrium between grips, at the density last given to `momentum`.
+    """Finds displacements in equilibrium between grips, at the density and dead loads last given to `momentum`.
 
     Parameters
     ----------
     momentum: forces and tangents.
     free: (n*dim,) mask of the degrees of freedom that no grip holds.
-    tolerance: residual force at which equilibrium is reached, relative to the forces inside.
+    tolerance: residual force at which equilibrium is reached, relative to the forces inside and the dead loads.
     most: Newton steps after which an equilibrium is given up, unless a call says more.
     threads: of the factorisations.
 
@@ -73,12 +73,13 @@ class Newton:
         momentum, live = self.momentum, self._live()
         u = u.copy()
         force = momentum.force(u)
-        energy = momentum.energy
+        energy = momentum.potential
         lowest = min(self.LEAST_J, momentum.least_J)
         last, length, modified = np.inf, 1.0, False
+        pulled = 0.0 if momentum.dead is None else float(np.linalg.norm(momentum.dead.values))
         for _ in range(most):
             r = force.ravel()[self.free]
-            error = float(np.linalg.norm(r[live]) / (np.linalg.norm(force) + self._least_force))
+            error = float(np.linalg.norm(r[live]) / (np.linalg.norm(force) + self._least_force + pulled))
             if error <= tolerance:
                 return u, force
             self.steps += 1
@@ -104,7 +105,7 @@ class Newton:
                     self._kept = None
                 modified = False
             u += length * step
-            energy = momentum.energy
+            energy = momentum.potential
         raise ConvergenceError(f"no equilibrium within {most} Newton steps")
 
     def predict(self, u: np.ndarray, move: np.ndarray) -> np.ndarray:
@@ -156,7 +157,7 @@ class Newton:
 
     def _search(self, u: np.ndarray, step: np.ndarray, slope: float, energy: float,
                 lowest: float) -> tuple[float, np.ndarray]:
-        """Length, halved from 1, with which `step` lowers the energy and inverts no Gauss point, and the force there.
+        """Length, halved from 1, with which `step` lowers the potential and inverts no Gauss point, and force there.
 
         The length is 0 if there is none.
         """
@@ -164,7 +165,7 @@ class Newton:
         while slope < 0.0 and length >= self.SHORTEST:
             momentum.force(u + length * step, force)
             fits = momentum.least_J >= lowest and np.isfinite(momentum.energy)
-            if fits and momentum.energy <= energy + 1e-4 * length * slope + self._noise:
+            if fits and momentum.potential <= energy + 1e-4 * length * slope + self._noise:
                 return length, force
             length *= 0.5
         return 0.0, force

@@ -9,7 +9,9 @@ import numpy as np
 
 from .crack import CrackTracker, Tips
 from .density import DensitySolver
+from .gauge import Gauge
 from .guards import Guard
+from .loading import Loading
 from .momentum import Momentum
 from .output import History, Series, prepare_folder, write_atomic
 from .scene import Scene
@@ -32,10 +34,11 @@ class Recorder:
     """
 
     def __init__(self, scene: Scene, folder: Path, momentum: Momentum, density: DensitySolver,
-                 memory: dict[str, Any] | None = None) -> None:
+                 loading: Loading, memory: dict[str, Any] | None = None) -> None:
         self.scene, self.momentum, self.density = scene, momentum, density
         sample, space = scene.sample, scene.sample.space
-        held = [sample.nodes(grip.boundary) for grip in scene.grips]
+        names = [*(grip.boundary for grip in scene.grips), *(traction.boundary for traction in scene.tractions)]
+        held = [sample.nodes(name) for name in dict.fromkeys(names)]
         # a tip in the slowest material has to have moved between two looks at it
         self.tracker = CrackTracker(space, scene.sink_law.length_scale, momentum.shear_wave_speeds[0], held,
                                     sample.rim(*scene.faces))
@@ -53,10 +56,8 @@ class Recorder:
         self.separated_at = float(memory.get("separated_at", np.inf))   #: first record after the separation [s]
         self.series.resume(len(self.frames))  # this may refuse, before any file is touched
         self.history = History(folder / "history.csv", memory["rows"], space.dim)
-        self._load_nodes = held[0]
         self._marked: np.ndarray | None = None  # gamma when the tracker last looked; a solve makes a new array
-        first = np.array([v or 0.0 for v in scene.grips[0].velocity])
-        self._load_direction = first / (np.linalg.norm(first) or 1.0)
+        self.gauge = Gauge(scene, loading)
         controls = scene.controls
         quasistatic = controls.analysis == "quasistatic"
         self.guard = Guard(scene, momentum)
@@ -71,7 +72,7 @@ class Recorder:
 
     def reached_onset(self, state: State, reaction: np.ndarray) -> None:
         """Note the onset."""
-        self.onset = {"displacement_mm": state.grip * self.scene.speed, "reaction_N_per_mm": self.load(reaction),
+        self.onset = {"displacement_mm": self.gauge.displacement(state), "reaction_N_per_mm": self.load(reaction),
                       "elastic_energy": state.ledger.elastic, "gamma_min": float(state.gamma.min()),
                       "sink": state.ledger.sink, "work": state.ledger.work,
                       "loading_balance": state.ledger.balance}
@@ -79,8 +80,8 @@ class Recorder:
         self.guard.check_onset(state)
 
     def load(self, reaction: np.ndarray) -> float:
-        """Force on the first grip along its velocity [N; N/mm in 2D]."""
-        return float((reaction[self._load_nodes] @ self._load_direction).sum())
+        """The load that is reported, see :class:`.Gauge` [N; N/mm in 2D]."""
+        return self.gauge.load(reaction)
 
     # --- the event ---
     def start(self, state: State, reaction: np.ndarray) -> None:
@@ -146,8 +147,8 @@ class Recorder:
         quasistatic = state.phase == "event" and self.scene.controls.analysis == "quasistatic"
         return {
             "phase": state.phase, "step": state.step, "time_s": 0.0 if quasistatic else state.time,
-            "grip_displacement_mm": state.grip * self.scene.speed, "reaction_N_per_mm": self.load(reaction),
-            "elastic": ledger.elastic, "kinetic": ledger.kinetic, "work": ledger.work,
+            "grip_displacement_mm": self.gauge.displacement(state), "reaction_N_per_mm": self.load(reaction),
+            "elastic": ledger.elastic, "loads": ledger.loads, "kinetic": ledger.kinetic, "work": ledger.work,
             "sink_stored": ledger.sink_stored, "sink_kinetic": ledger.sink_kinetic, "deletion": ledger.deletion,
             "numerical": ledger.numerical, "released": ledger.released, "U_paper": ledger.paper,
             "balance": ledger.balance, "tip_x_mm": float(x[0]), "tip_y_mm": float(x[1]), "tip_z_mm": float(x[2]),

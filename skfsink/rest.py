@@ -15,6 +15,7 @@ import numpy as np
 
 from .density import DensitySolver
 from .hht import HHT, HHTControls
+from .loading import Loading
 from .momentum import Momentum
 from .state import State
 
@@ -28,7 +29,7 @@ class LoadingFromRest:
     ----------
     momentum, density: the two fields.
     free: (n*dim,) mask of the degrees of freedom that no grip holds.
-    grip_velocity: (n, dim) velocity of the held ones [mm/s].
+    motion: of the held ones, as a :class:`.Loading` without ramps, or as their velocity (n, dim) [mm/s].
     controls: options of the event; damping and mass are taken from it.
     deletion: gamma at which an element fails.
 
@@ -42,13 +43,14 @@ class LoadingFromRest:
     ITERATIONS = 200     # the coupling of the fields converges ever more slowly towards the limit load
     FAST = 100.0         # speed at which the event begins, in speeds of a grip; a body under load has a few
 
-    def __init__(self, momentum: Momentum, density: DensitySolver, free: np.ndarray, grip_velocity: np.ndarray,
+    def __init__(self, momentum: Momentum, density: DensitySolver, free: np.ndarray, motion: np.ndarray | Loading,
                  controls: HHTControls, deletion: float = 1e-6, threads: int = 1) -> None:
         size = float(np.ptp(momentum.space.X, axis=0).max())
-        self._fast = self.FAST * float(np.abs(grip_velocity).max())
-        longest = max(self.INCREMENT * size / float(np.abs(grip_velocity).max()), 2 * controls.dt)
+        speed = Loading.of(momentum.space, free, motion).speed(0.0)
+        self._fast = self.FAST * speed
+        longest = max(self.INCREMENT * size / speed, 2 * controls.dt)
         self._last = controls.dt
-        self.integrator = HHT(momentum, density, free, grip_velocity, replace(
+        self.integrator = HHT(momentum, density, free, motion, replace(
             controls, coupling="iterated", dt=longest, dt_first=0.0, force_tolerance=self.TOLERANCE,
             correction_tolerance=2 * self.TOLERANCE, gamma_tolerance=self.TOLERANCE, max_iterations=self.ITERATIONS),
             deletion, threads)

@@ -19,7 +19,8 @@ from .errors import OutputError, ParameterError, require
 from .explicit import ExplicitControls
 from .halving import Whole
 from .hht import HHTControls
-from .loads import Grip, Traction
+from .loading import Loading
+from .loads import Grip, Ramp, Traction
 from .material import Material, SinkLaw
 from .momentum import ELEMENTS, check_element
 from .regions import Region, check_lengths, divided
@@ -126,8 +127,8 @@ class Scene:
     title: for pictures.
     parameters: the arguments of the case function, enough to make this scene again.
     sample, material, sink_law: what is computed.
-    grips: the first one's reaction is the load that is reported, in the direction of its velocity.
-    tractions: dead loads.
+    grips: the reaction of the first one that moves is the load that is reported, along its motion.
+    tractions: dead loads; without a grip that moves, the first one is the load that is reported.
     regions: elements of other materials than `material`; no element is in two.
     faces: in three dimensions, the surfaces of a sheet along which a crack runs; they are no edges it arrives at.
     view: azimuth and elevation [degrees] from which pictures show a body in space.
@@ -170,6 +171,10 @@ class Scene:
         check_element(self.controls.element, self.sample.space)
         check_lengths(self.sink_law, self.regions)
         _ = self.parts
+        loading = self.loading()
+        if self.controls.start == "rest" and (loading.knots or self.tractions):
+            raise ParameterError("start rest is for grips of constant velocity; this scene has "
+                                 f"{'tractions' if self.tractions else 'ramps'}: take start onset")
 
     @property
     def parts(self) -> tuple[Region, ...]:
@@ -189,23 +194,41 @@ class Scene:
         return replace(self, parameters={**self.parameters, "analysis": analysis},
                        controls=replace(self.controls, analysis=analysis))
 
+    def loading(self) -> Loading:
+        """What is held, moved and pulled at each load time.
+
+        Raises
+        ------
+        ParameterError, MeshError
+            As of :class:`.Loading`.
+        """
+        nodes = self.sample.nodes
+        return Loading(self.sample.space, [(nodes(grip.boundary), grip) for grip in (*self.grips, *self.rollers)],
+                       [(nodes(traction.boundary), traction) for traction in self.tractions])
+
     def constraints(self) -> tuple[np.ndarray, np.ndarray]:
-        """Mask of the free degrees of freedom (n*dim,) and velocity of the held ones (n, dim) [mm/s]."""
-        X = self.sample.space.X
-        free, velocity = np.ones(X.shape, bool), np.zeros(X.shape)
-        for grip in (*self.grips, *self.rollers):
-            nodes = self.sample.nodes(grip.boundary)
-            for i, value in enumerate(grip.velocity):
-                if value is not None:
-                    free[nodes, i] = False
-                    velocity[nodes, i] = value
-        return free.ravel(), velocity
+        """Mask of the free degrees of freedom (n*dim,) and velocity of the held ones at first (n, dim) [mm/s]."""
+        loading = self.loading()
+        return loading.free, loading.velocity(0.0)
+
+    @property
+    def moving(self) -> Grip | None:
+        """The first grip that moves at some time, None if there is none."""
+        return next((grip for grip in self.grips if any(isinstance(v, Ramp) or v for v in grip.velocity)), None)
+
+    @property
+    def opposite(self) -> Grip | None:
+        """The grip to which the motion of that one is relative: the last one, None if it is itself."""
+        return self.grips[-1] if self.grips and self.grips[-1] is not self.moving else None
 
     @property
     def speed(self) -> float:
-        """Speed at which the grips part [mm/s]."""
-        velocity = np.array([[v or 0.0 for v in grip.velocity] for grip in self.grips])
-        return float(np.linalg.norm(velocity[0] - velocity[-1]))
+        """Speed at which the grips part at first [mm/s]."""
+        velocity = np.zeros((2, self.sample.space.dim))
+        for row, grip in zip(velocity, (self.moving, self.opposite)):
+            if grip is not None:
+                row[:] = [v.rate(0.0) if isinstance(v, Ramp) else v or 0.0 for v in grip.velocity]
+        return float(np.linalg.norm(velocity[0] - velocity[1]))
 
     def toml(self) -> str:
         """Text of `scene.toml`."""

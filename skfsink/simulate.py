@@ -61,14 +61,16 @@ class Simulation:
             raise CheckpointError(f"the checkpoint {path} is damaged: it is a state without its run")
         self.scene, self.folder, self.display = scene, folder, display
         c, space = scene.controls, scene.sample.space
-        self.free, self.grip_velocity = scene.constraints()
+        self.loading = scene.loading()
+        self.free = self.loading.free
         self.momentum = Momentum(space, scene.material, c.element, c.force_floor, c.workers(space.dim),
                                  scene.regions)
+        self.momentum.dead = self.loading.dead
         self.density = DensitySolver(space, scene.sink_law, c.sink, active_zone=c.active_zone,
                                      regions=scene.regions)
-        self.statics = Statics(self.momentum, self.density, self.free, self.grip_velocity, c.statics, c.deletion,
+        self.statics = Statics(self.momentum, self.density, self.free, self.loading, c.statics, c.deletion,
                                c.workers(space.dim))
-        self.recorder = Recorder(scene, folder, self.momentum, self.density,
+        self.recorder = Recorder(scene, folder, self.momentum, self.density, self.loading,
                                  stored[2]["recorder"] if stored else None)
         self.notes = Notes(display.say, stored[2].get("warnings", []) if stored else [])
         self.state = State.intact(space)
@@ -117,8 +119,8 @@ class Simulation:
             reaction = self.momentum.force(state.u)
             self.recorder.loading(state, reaction)
             started = True
-            done = 0.5 * min(1.0, tolerance * state.grip / loading.increment) ** 0.25
-            self.display.update(done, f"grips {state.grip * self.scene.speed:.4f} mm  load "
+            done = 0.5 * min(1.0, tolerance * state.grip / (loading.increment or np.inf)) ** 0.25
+            self.display.update(done, f"grips {self.recorder.gauge.displacement(state):.4f} mm  load "
                                       f"{self.recorder.load(reaction):.4f} N/mm  least γ {state.gamma.min():.3f}")
             self._pause("loading")
         if started or not self.recorder.onset:
@@ -128,6 +130,7 @@ class Simulation:
 
     def _adopt(self, onset: State) -> None:
         self.state = onset
+        self.momentum.set_time(onset.grip)
         self.momentum.set_gamma(onset.gamma, onset.deleted)
         reaction = self.momentum.force(onset.u)
         self.recorder.loading(onset, reaction)
@@ -135,15 +138,17 @@ class Simulation:
 
     def _begin_event(self) -> None:
         """Start a new ledger at the onset, from rest just past it unless the body has come there in motion."""
-        state, factor = self.state, 1.0 + (0.0 if self._from_rest else self.scene.controls.overshoot)
-        state.u *= factor
-        state.grip *= factor
+        state, past = self.state, 0.0 if self._from_rest else self.scene.controls.overshoot
+        state.u *= 1.0 + past
+        state.grip = self.statics.past(state.grip, past)
         state.time, state.step, state.phase = 0.0, 0, "event"
         state.ledger = Ledger()
+        self.momentum.set_time(state.grip)
         self.momentum.set_gamma(state.gamma, state.deleted)
         reaction = self.momentum.force(state.u)
         if self.scene.controls.analysis == "quasistatic":
-            state.ledger.initial = state.ledger.elastic = self.momentum.energy
+            state.ledger.elastic, state.ledger.loads = self.momentum.energy, self.momentum.loads
+            state.ledger.initial = self.momentum.potential
         else:
             self.statics.newton.release()
             if isinstance(self.integrator, HHT):
@@ -156,14 +161,14 @@ class Simulation:
     def _make_integrator(self) -> None:
         c, threads = self.scene.controls, self.scene.controls.workers(self.scene.sample.space.dim)
         if self.state.phase == "loading":
-            self._from_rest = LoadingFromRest(self.momentum, self.density, self.free, self.grip_velocity, c.hht,
+            self._from_rest = LoadingFromRest(self.momentum, self.density, self.free, self.loading, c.hht,
                                               c.deletion, threads)
             self.integrator = self._from_rest.integrator
         elif c.integrator == "explicit":
-            self.integrator = Explicit(self.momentum, self.density, self.free, self.grip_velocity, c.explicit,
+            self.integrator = Explicit(self.momentum, self.density, self.free, self.loading, c.explicit,
                                        c.deletion)
         else:
-            self.integrator = HHT(self.momentum, self.density, self.free, self.grip_velocity, c.hht, c.deletion,
+            self.integrator = HHT(self.momentum, self.density, self.free, self.loading, c.hht, c.deletion,
                                   threads)
 
     def _integrate(self) -> None:
@@ -261,6 +266,7 @@ class Simulation:
             assert self.integrator is not None
             self.integrator.restore(state, memories["integrator"])
         else:
+            self.momentum.set_time(state.grip)
             self.momentum.set_gamma(state.gamma, state.deleted)
             self.momentum.force(state.u)
 

@@ -1,9 +1,9 @@
 """Statics: loading to the onset, and quasi-static propagation.
 
-Up to a sharp limit the loaded body is elastic and gamma hardly moves; beyond it no static solution exists. Loading
-looks for that limit, the *onset*, by bisection on the load. A quasi-static analysis then holds the grips just past
-the onset and lets the crack run through a sequence of equilibria, giving up at each the energy that a dynamic
-analysis would turn into motion.
+Grips and dead loads follow the load time, the clock of the loading. Up to a sharp limit the loaded body is elastic
+and gamma hardly moves; beyond it no static solution exists. Loading looks for that limit, the *onset*, by bisection on
+the load. A quasi-static analysis then holds the grips just past the onset and lets the crack run through a sequence of
+equilibria, giving up at each the energy that a dynamic analysis would turn into motion.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import numpy as np
 from .deletion import delete_failed
 from .density import DensitySolver
 from .errors import ConvergenceError, require
+from .loading import Loading
 from .momentum import Momentum
 from .newton import Newton
 from .state import State
@@ -36,7 +37,8 @@ class StaticsControls:
     gamma_tolerance: change of gamma in a pass at which the coupled fields are converged, in (0, 0.01].
     front: a sweep fails the points whose stored energy is at least this share of the greatest one, in [0, 1]; 0 fails
         all that are past the energy limiter at once.
-    increment: first (and largest) load increment, as displacement of a grip over the size of the body, in (0, 0.5].
+    increment: first (and largest) load increment, as displacement of a grip over the size of the body, or as change of
+        a traction over twice the shear modulus, in (0, 0.5].
     onset_tolerance: width of the last bisection interval of the onset, relative to the load, in (0, 0.1].
     max_newton: Newton steps after which an equilibrium is given up, >= 3.
     max_passes: passes over the two fields after which a load increment is given up, >= 3.
@@ -67,20 +69,23 @@ class Statics:
     ----------
     momentum, density: the two fields.
     free: (n*dim,) mask of the degrees of freedom that no grip holds.
-    grip_velocity: (n, dim) velocity of the held ones [mm/s]; at load time t they are displaced by velocity times t.
+    motion: of the held ones, as a :class:`.Loading`, or as their velocity (n, dim) [mm/s]; then they are displaced by
+        velocity times t at load time t.
     deletion: gamma at which an element fails.
     """
 
     STALLED = 0.9  # factor of the changes of gamma a pass from which on the load is within 0.1 % of the onset
+    LEAST = 1e-6  # part of the first increment at which a body without load is given up
     SNAP = 400  # Newton steps in a sweep: the body may snap to a shape far away
 
-    def __init__(self, momentum: Momentum, density: DensitySolver, free: np.ndarray, grip_velocity: np.ndarray,
+    def __init__(self, momentum: Momentum, density: DensitySolver, free: np.ndarray, motion: np.ndarray | Loading,
                  controls: StaticsControls | None = None, deletion: float = 1e-6, threads: int = 1) -> None:
         self.momentum, self.density, self.deletion = momentum, density, deletion
         self.controls = controls or StaticsControls()
         self.space = momentum.space
         self.free = free
-        self.grip_velocity = grip_velocity
+        self.loading = Loading.of(self.space, free, motion)
+        self._size = float(np.ptp(self.space.X, axis=0).max())
         self.newton = Newton(momentum, free, self.controls.tolerance, self.controls.max_newton, threads)
         self.settled = False      #: whether the last sweep of `propagate` found nothing left to change
         self.increment = 0.0      #: current load increment, as load time [s]; 0 before the first
@@ -101,9 +106,41 @@ class Statics:
         """Numerical factorisations made so far."""
         return self.newton.solver.count
 
-    def _predict(self, u: np.ndarray, increment: float) -> np.ndarray:
-        """`u` after moving the grips for a further load time `increment`, to first order in it."""
-        return self.newton.predict(u, self.grip_velocity * increment)
+    def _predict(self, u: np.ndarray, increment: float, t: float = 0.0) -> np.ndarray:
+        """`u` after moving the grips from load time `t` on for a time `increment`, to first order in it.
+
+        The dead loads are those last given to the momentum balance.
+        """
+        return self.newton.predict(u, self.loading.velocity(t) * increment)
+
+    # --- load time ---
+    def _longest(self, t: float) -> float:
+        """The largest increment of the load time from `t` on, infinity if nothing moves up to the next knot [s]."""
+        speed, pull, increment = self.loading.speed(t), self.loading.pull(t), self.controls.increment
+        by_grips = increment * self._size / speed if speed > 0.0 else np.inf
+        return min(by_grips, increment * 2.0 * self.momentum.material.shear_modulus / pull if pull > 0.0 else np.inf)
+
+    def _path(self, t: float) -> float:
+        """Length of the way to load time `t`, in the largest increments; the measure of the load."""
+        total, start = 0.0, 0.0
+        while start < t:
+            end = min(self.loading.knot(start), t)
+            total += (end - start) / self._longest(start)
+            start = end
+        return total
+
+    def _age(self, t: float) -> float:
+        """Time the way to load time `t` would have taken at the rates from `t` on: `t` itself without ramps [s]."""
+        return self._path(t) * self._longest(t) if self.loading.knots else t
+
+    def past(self, t: float, share: float) -> float:
+        """The load time at which the load has grown by `share` since load time `t` [s]."""
+        return t + share * self._age(t) if self.loading.knots else t * (1.0 + share)
+
+    def _end(self, t: float, increment: float) -> float:
+        """Load time after an increment from `t` on: no later than the next knot, which is hit exactly [s]."""
+        knot = self.loading.knot(t)
+        return knot if knot - t <= 1.001 * increment else t + increment
 
     # --- both fields ---
     def _settle(self, state: State, u: np.ndarray) -> tuple[np.ndarray, ...] | None:
@@ -135,29 +172,42 @@ class Statics:
     def load(self, state: State) -> Iterator[State]:
         """Load `state` to the onset, yielding it after each accepted increment; the last one is the onset.
 
-        The ledger's work is the trapezoidal work of the grips, so its balance shows the error of the increments.
+        An increment ends at the next knot of the loading at the latest; a stretch in which nothing moves is passed
+        over. The ledger's work is trapezoidal, so its balance shows the error of the increments.
+
+        Raises
+        ------
+        ConvergenceError
+            There is no equilibrium under the smallest increment, or nothing moves any more and there was no onset.
         """
-        c = self.controls
-        size = float(np.ptp(self.space.X, axis=0).max())
-        speed = float(np.abs(self.grip_velocity).max())
-        if self.increment == 0.0:
-            self.increment = c.increment * size / speed
+        c, dead = self.controls, self.momentum.dead
         ledger = state.ledger
         held = ~self.free.reshape(state.u.shape)
+        self.momentum.set_time(state.grip)
         self.momentum.set_gamma(state.gamma, state.deleted)
         force = self.momentum.force(state.u)
         W = self.momentum.W
         while True:
+            longest = self._longest(state.grip)
+            if longest == np.inf:
+                self._pass_over(state, float((W / self.density.phi)[self.momentum.gamma > 0].max(initial=0.0)))
+                continue
+            self.increment = self.increment or longest
+            end = self._end(state.grip, self.increment)
+            increment = self.increment if end == state.grip + self.increment else end - state.grip
+            before = None if dead is None else dead.values
+            self.momentum.set_time(end)
             self.momentum.set_gamma(state.gamma, state.deleted)
             try:
-                settled = self._settle(state, self._predict(state.u, self.increment))
+                settled = self._settle(state, self._predict(state.u, increment, state.grip))
             except ConvergenceError:
                 settled, self.refused = None, "no equilibrium"
             if settled is None:
-                self.increment *= 0.5
-                if self.increment <= c.onset_tolerance * (state.grip + self.increment):
-                    if state.grip == 0.0:
-                        raise ConvergenceError("the body finds no equilibrium under the smallest load increment")
+                self.increment = 0.5 * increment
+                self.momentum.set_time(state.grip)
+                if state.step == 0 and self.increment < self.LEAST * longest:
+                    raise ConvergenceError("the body finds no equilibrium under the smallest load increment")
+                if state.step and self.increment <= c.onset_tolerance * (self._age(state.grip) + self.increment):
                     self._doubt()
                     self.momentum.set_gamma(state.gamma, state.deleted)
                     self.momentum.force(state.u)
@@ -165,14 +215,17 @@ class Statics:
                 continue
             u, new_force, gamma, W_max, W_new = settled
             ledger.work += 0.5 * float(np.sum((force + new_force)[held] * (u - state.u)[held]))
-            before = self.momentum.effective(state.gamma, state.deleted)
-            ledger.drop(self.space.w, 0.5 * (W + W_new), before, self.momentum.gamma)
+            if dead is not None and before is not None:
+                ledger.work += dead.changed(before, 0.5 * (state.u + u))
+            intact = self.momentum.effective(state.gamma, state.deleted)
+            ledger.drop(self.space.w, 0.5 * (W + W_new), intact, self.momentum.gamma)
             state.u, state.gamma, state.W_max = u, gamma, W_max
             force, W = self.momentum.force(state.u), W_new  # at the settled gamma, as after a resume
-            state.grip += self.increment
-            state.time = state.grip
+            if end == self.loading.knot(state.grip):
+                self.increment = 0.0  # the next one is by the rates that follow
+            state.grip = state.time = end
             state.step += 1
-            ledger.elastic = self.momentum.energy
+            ledger.elastic, ledger.loads = self.momentum.energy, self.momentum.loads
             yield state
 
     # --- quasi-static propagation ---
@@ -180,32 +233,35 @@ class Statics:
         """Let the crack run through equilibria, yielding after each sweep; the caller stops when it has crossed.
 
         A sweep: equilibrium at fixed gamma (the energy it gives up is `released`), then the history, gamma and the
-        deletions at fixed displacement (what they take is D). The grips stand still while the crack runs; where it
-        arrests, `settled` is set, and the next sweep moves them on by `advance` times their displacement.
+        deletions at fixed displacement (what they take is D). Grips and dead loads stand still while the crack runs;
+        where it arrests, `settled` is set, and the next sweep moves them on by `advance` of their way so far.
 
         Raises
         ------
         ConvergenceError
-            The crack has not crossed at `limit` times the displacement of the start.
+            The crack has not crossed at `limit` times the way of the start, or when nothing moves any more; or there is
+            no equilibrium, as under dead loads alone.
         """
-        ledger = state.ledger
-        furthest = limit * state.grip
+        ledger, dead = state.ledger, self.momentum.dead
+        furthest = limit * self._path(state.grip)
+        self.momentum.set_time(state.grip)
         if state.step == 0:
             self.momentum.set_gamma(state.gamma, state.deleted)
             self.momentum.force(state.u)
-            ledger.initial = ledger.elastic = self.momentum.energy
+            ledger.elastic, ledger.loads = self.momentum.energy, self.momentum.loads
+            ledger.initial = self.momentum.potential
         while True:
             self.momentum.set_gamma(state.gamma, state.deleted)
             self.momentum.force(state.u)
             if self.settled:
-                self._advance(state, advance * state.grip)
-                if state.grip > furthest:
+                self._advance(state, advance)
+                if self._path(state.grip) > furthest:
                     raise ConvergenceError(f"the crack has not crossed the sample at {limit:g} times the onset load")
             else:
-                before = self.momentum.energy
+                before = self.momentum.potential
                 state.u = self._relax(state)
-                ledger.released += before - self.momentum.energy
-            W = self.momentum.W
+                ledger.released += before - self.momentum.potential
+            W, loads = self.momentum.W, None if dead is None else dead.values
             postponed = self._follow(state, W)
             gamma = self.density.solve(state.W_max, state.gamma)
             change = float(np.abs(gamma - state.gamma).max())
@@ -216,6 +272,9 @@ class Statics:
             undeleted = self.momentum.effective(gamma, state.deleted)
             delete_failed(self.space, state, self.deletion, self.density.failure_energy)
             self.momentum.set_gamma(gamma, state.deleted)
+            if dead is not None and loads is not None:
+                ledger.work += dead.changed(loads, state.u)
+                ledger.loads = dead.potential(state.u)
             ledger.drop(self.space.w, W, old, undeleted)
             ledger.deletion += float(np.einsum("eq,eq,eq->", self.space.w, W, undeleted - self.momentum.gamma))
             ledger.elastic = float(np.einsum("eq,eq,eq->", self.space.w, W, self.momentum.gamma))
@@ -252,14 +311,36 @@ class Statics:
         state.W_max = np.where(waiting, state.W_max, np.maximum(state.W_max, W))
         return bool(waiting.any())
 
-    def _advance(self, state: State, increment: float) -> None:
-        """Move the grips on by a load time `increment` at fixed gamma, to the new equilibrium."""
-        held = ~self.free.reshape(state.u.shape)
+    def _advance(self, state: State, share: float) -> None:
+        """Let grips and dead loads go on by a `share` of their way at fixed gamma, to the new equilibrium."""
+        held, dead = ~self.free.reshape(state.u.shape), self.momentum.dead
+        while self._longest(state.grip) == np.inf:
+            knot = self.loading.knot(state.grip)
+            if knot == np.inf:
+                raise ConvergenceError(f"the crack is arrested, and nothing moves any more after load time "
+                                       f"{state.grip:.4g} s: let a ramp go further")
+            state.grip = knot
         force = self.momentum.force(state.u)
-        u, new_force = self.newton.equilibrium(self._predict(state.u, increment), most=self.SNAP)
+        increment = share * self._age(state.grip)
+        end = self._end(state.grip, increment)
+        increment = increment if end == state.grip + increment else end - state.grip
+        before = None if dead is None else dead.values
+        self.momentum.set_time(end)
+        u, new_force = self.newton.equilibrium(self._predict(state.u, increment, state.grip), most=self.SNAP)
         state.ledger.work += 0.5 * float(np.sum((force + new_force)[held] * (u - state.u)[held]))
-        state.u = u
-        state.grip += increment
+        if dead is not None and before is not None:
+            state.ledger.work += dead.changed(before, 0.5 * (state.u + u))
+        state.u, state.grip = u, end
+
+    def _pass_over(self, state: State, reached: float) -> None:
+        """Go on to the next knot, where nothing moves before it; `reached` is the greatest W/Phi."""
+        knot = self.loading.knot(state.grip)
+        if knot == np.inf:
+            raise ConvergenceError(f"nothing moves after load time {state.grip:.4g} s, and nothing has failed: the "
+                                   f"greatest W/Phi is {reached:.3g}, where points fail near 1; let a ramp go further, "
+                                   f"or give a grip or traction a rate")
+        state.grip = state.time = knot
+        self.momentum.set_time(knot)
 
     # --- checkpoints ---
     def memory(self) -> dict[str, np.ndarray]:
