@@ -19,7 +19,7 @@ from .meshing import read_mesh
 from .shapes import SHAPES
 from .space import Space
 
-__all__ = ["Sample", "data_folder", "file_sample", "load_sample", "shape_mesh", "shape_sample"]
+__all__ = ["Sample", "data_folder", "data_roots", "file_sample", "load_sample", "shape_mesh", "shape_sample"]
 
 SIDE = 1e-6  # distance from the end of a body, over its size, within which a node is on that side
 _CELLS = {"quad": (skfem.MeshQuad, "line"), "hexahedron": (skfem.MeshHex, "quad")}
@@ -78,10 +78,15 @@ class Sample:
         return np.unique(facets)
 
 
+def data_roots() -> tuple[Path, ...]:
+    """Folders of the committed data of all cases: those of the installed package, those of a checkout."""
+    package = Path(__file__).resolve().parent
+    return package / "data" / "cases", package.parent / "cases"
+
+
 def data_folder(case: str) -> Path:
     """Folder with the committed data of a case: `cases/<case>` of a checkout, or its copy in the installed package."""
-    package = Path(__file__).resolve().parent
-    for root in (package / "data" / "cases", package.parent / "cases"):
+    for root in data_roots():
         if (root / case).is_dir():
             return root / case
     raise MeshError(f"the data of case {case} are not installed")

@@ -1,4 +1,4 @@
-"""`list`: the cases there are."""
+"""`list`: the cases and the decks there are."""
 
 from __future__ import annotations
 
@@ -6,13 +6,14 @@ __all__ = ["list_cases"]
 
 
 def list_cases() -> None:
-    """List the cases, with what they are and their meshes."""
+    """List the cases and the decks of other scenes, with what they are and their meshes."""
     from docstring_parser import parse
     from rich.console import Console
     from rich.table import Table
 
     from ..deck import CASES, case_function
     from ..sample import data_folder
+    from ..shipped import description, shipped_decks
 
     table = Table(box=None, pad_edge=False)
     table.add_column("case", no_wrap=True)
@@ -22,4 +23,14 @@ def list_cases() -> None:
         meshes = ["a mesh file"] if case == "custom" else sorted(
             path.stem for path in (data_folder(case) / "meshes").glob("*.vtu"))
         table.add_row(case, parse(case_function(case).__doc__ or "").short_description, ", ".join(meshes))
-    Console().print(table)
+    decks = Table(box=None, pad_edge=False)
+    decks.add_column("deck", no_wrap=True)
+    decks.add_column("what it is")
+    decks.add_column("meshes")
+    for name, path in shipped_decks().items():
+        meshes = sorted(mesh.stem for mesh in (path.parent / "meshes").glob("*.vtu"))
+        decks.add_row(name, description(path), ", ".join(meshes))
+    console = Console()
+    console.print(table)
+    console.print()
+    console.print(decks)

@@ -19,14 +19,18 @@ def run(deck: Path, *, out: Path | None = None, overwrite: Annotated[bool, FLAG]
     Parameters
     ----------
     deck
-        TOML file; `skfsink show CASE` prints one, and the scene.toml of any run is one.
+        TOML file, or the name of a deck that `skfsink list` shows; `skfsink show CASE` prints one, and the
+        scene.toml of any run is one.
     out
-        Output folder; default results/CASE/MESH-ANALYSIS[-INTEGRATOR].
+        Output folder; default results/CASE/MESH-ANALYSIS[-INTEGRATOR], or results/NAME of a deck with a name.
     overwrite
         Use an output folder that is not empty.
     quiet
         Show no progress.
     """
     from ..deck import read_deck
+    from ..shipped import deck_name, deck_path
 
-    read_deck(deck).run(out=out, overwrite=overwrite, quiet=quiet)
+    path = deck_path(deck)
+    named = None if path == deck else Path("results") / deck_name(path)
+    read_deck(path).run(out=out or named, overwrite=overwrite, quiet=quiet)

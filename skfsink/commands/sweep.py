@@ -19,9 +19,10 @@ def sweep(deck: Path, *, vary: Annotated[list[str], Parameter(negative="", consu
     Parameters
     ----------
     deck
-        TOML file of the scene.
+        TOML file of the scene, or the name of a deck that `skfsink list` shows.
     vary
-        NAME=A..B:N (N values), NAME=A..B (whole numbers) or NAME=A,B,C; may be given several times.
+        NAME=A..B:N (N values), NAME=A..B (whole numbers) or NAME=A,B,C; may be given several times. Mesh files are
+        sought from the deck's folder.
     out
         Folder of the sweep, with one of each run; default results/sweep/DECK.
     jobs
@@ -33,6 +34,8 @@ def sweep(deck: Path, *, vary: Annotated[list[str], Parameter(negative="", consu
     quiet
         Show no progress.
     """
+    from ..shipped import deck_name, deck_path
     from ..sweep.plan import run_sweep
 
-    run_sweep(deck, vary, out or Path("results") / "sweep" / deck.stem, jobs, scheduler, parquet, quiet)
+    path = deck_path(deck)
+    run_sweep(path, vary, out or Path("results") / "sweep" / deck_name(path), jobs, scheduler, parquet, quiet)

@@ -41,7 +41,7 @@ def run_sweep(path: Path, vary: Sequence[str], out: Path, jobs: int = 1, schedul
     variations = [read_variation(text, known) for text in vary]
     varied = list(combinations(variations))
     folders = [out / _name(values) for values in varied]
-    _lay_out(deck, varied, folders)
+    _lay_out(deck, [_beside(values, path.parent) for values in varied], folders)
     names = [name for name, _ in variations]
     with Display(quiet) as display:
         display.phase("sweep")
@@ -71,6 +71,12 @@ def run_sweep(path: Path, vary: Sequence[str], out: Path, jobs: int = 1, schedul
 def _name(values: Mapping[str, Any]) -> str:
     return ",".join(f"{name}={value:.10g}" if isinstance(value, float) else f"{name}={value}"
                     for name, value in values.items()).replace("/", "_")
+
+
+def _beside(values: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    """The values, with a mesh file sought from the folder of the deck, as the deck's own is."""
+    mesh = values.get("mesh", "")
+    return {**values, "mesh": str((folder / mesh).absolute())} if Path(mesh).suffix else {**values}
 
 
 def _lay_out(deck: Deck, varied: Sequence[Mapping[str, Any]], folders: Sequence[Path]) -> None:
