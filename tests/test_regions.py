@@ -352,14 +352,15 @@ def test_explicit_ledger_closes_in_two_materials(layered: Fracture) -> None:
     assert state.gamma.min() > 0 and state.gamma.max() <= 1 + 1e-9
 
 
-def test_hht_ledger_closes_in_two_materials(layered: Fracture) -> None:
+@pytest.mark.parametrize(("mass", "end"), [("lumped", 1.2e-5), ("consistent", 8e-6)])
+def test_hht_ledger_closes_in_two_materials(layered: Fracture, mass: str, end: float) -> None:
     """Fails as the explicit one does, with the tangent and mass of each material: 1e-8 with converged steps."""
     fresh, momentum, density, free, velocity = layered
     state = fresh()
     hht = HHT(momentum, density, free, velocity, HHTControls(
-        dt=4e-7, force_tolerance=1e-8, correction_tolerance=1e-8, gamma_tolerance=1e-7))
+        dt=4e-7, mass=mass, force_tolerance=1e-8, correction_tolerance=1e-8, gamma_tolerance=1e-7))
     hht.begin(state)
-    for _ in hht.run(state, 1.2e-5):
+    for _ in hht.run(state, end):
         assert abs(state.ledger.balance) <= 1e-8 * state.ledger.initial
     assert state.deleted.any() and state.ledger.sink > 0.05 * state.ledger.initial
     assert state.ledger.paper == pytest.approx(booked(momentum.space, state), rel=1e-12)
