@@ -25,7 +25,7 @@ from skfsink.study.pareto import pareto_front
 from skfsink.study.part import Part, Planned
 from skfsink.study.rates import extrapolated, observed_rate
 from skfsink.study.refinement import plate
-from skfsink.study.speed_accuracy import run_parts, speed_accuracy
+from skfsink.study.speed_accuracy import PARTS, run_parts, speed_accuracy
 from skfsink.study.store import Store
 
 
@@ -277,3 +277,18 @@ def test_command_line_refuses_an_unknown_part(capsys: pytest.CaptureFixture[str]
         command(speed_accuracy, ["--only", "space-time"], package="study")
     assert end.value.code == 2
     assert capsys.readouterr().err.startswith("skfsink: ")
+
+
+def test_documented_figures_are_those_of_the_file(tmp_path: Path):
+    """Fails if a table of the documentation is not what its JSON file gives, or that file cannot be drawn."""
+    docs = Path(__file__).parents[1] / "docs"
+    text = (docs / "speed_accuracy.md").read_text(encoding="utf-8").splitlines()
+    stored = json.loads((docs / "images" / "speed_accuracy.json").read_text(encoding="utf-8"))
+    assert stored["study"] == "speed_accuracy" and stored["machine"]["processor"]
+    for name, part in PARTS.items():
+        start = f"{name}/"
+        points = {k.removeprefix(start): p for k, p in stored["points"].items() if k.startswith(start)}
+        assert points and not [line for line in part.table(points) if line not in text]
+        assert {p.key for p in part.plan(False)} == points.keys()
+        part.draw(points, tmp_path / f"{name}.png")
+        assert (tmp_path / f"{name}.png").stat().st_size > 1e5

@@ -148,6 +148,8 @@ def _panel(ax: Axes, points: Points, field: str, dim: int, what: str) -> None:
         if failed:
             ax.plot(failed, [value(good[-1])] * len(failed), "x", ms=4, color=COLOURS[method])
     ax.set(xscale="log", yscale="log")
+    low, high = ax.get_ylim()
+    ax.set_ylim(low, high * (high / low) ** 0.45)  # room for the legend
     ax.legend(fontsize=5, loc="upper left", handlelength=1.2)
 
 
