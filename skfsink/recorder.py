@@ -33,6 +33,8 @@ class Recorder:
     onset, at_arrival: figures noted at those moments.
     """
 
+    RARER = 50.0  # times the interval of rows and frames, while a body from rest has not cracked
+
     def __init__(self, scene: Scene, folder: Path, momentum: Momentum, density: DensitySolver,
                  loading: Loading, memory: dict[str, Any] | None = None) -> None:
         self.scene, self.momentum, self.density = scene, momentum, density
@@ -62,6 +64,7 @@ class Recorder:
         quasistatic = controls.analysis == "quasistatic"
         self.guard = Guard(scene, momentum)
         self.guard.scale = self.onset.get("elastic_energy", 0.0)
+        self._waiting = controls.start == "rest"
         self._record_every = 1.0 if quasistatic else controls.record_every
         self._frame_every = 10.0 if quasistatic else controls.frame_every
 
@@ -95,7 +98,8 @@ class Recorder:
         self.guard.check_step(state)
         arrived = state.gamma is not self._marked and self.tracker.mark(state.time, state.gamma)
         self._marked = state.gamma
-        due = int(state.time / self._record_every) != int(before / self._record_every)
+        rarer = self.RARER if self._waits() else 1.0
+        due = int(state.time / (rarer * self._record_every)) != int(before / (rarer * self._record_every))
         if not (due or arrived):
             return False
         branches = self.tracker.max_branches
@@ -107,9 +111,14 @@ class Recorder:
             self.frame(state, "arrival")
         elif branches < 2 <= self.tracker.max_branches:
             self.frame(state, "branching")
-        elif int(state.time / self._frame_every) != int(before / self._frame_every):
+        elif int(state.time / (rarer * self._frame_every)) != int(before / (rarer * self._frame_every)):
             self.frame(state, "")
         return True
+
+    def _waits(self) -> bool:
+        """Whether a body that has come from rest in motion has not cracked yet, which may take thousands of records."""
+        self._waiting = self._waiting and not np.isfinite(self.tracker.cracked_at).any()
+        return self._waiting
 
     def finish(self, state: State, reaction: np.ndarray, dt: float) -> None:
         """Last row and frame, and the log of deleted elements."""

@@ -49,7 +49,7 @@ class Simulation:
         The checkpoint to resume from is missing, damaged, or of another scene or version.
     """
 
-    PATIENCE = 50.0  # a body that comes from rest in motion may take this many times `event_time` to crack
+    PATIENCE = 400.0  # a body that comes from rest in motion may take this many times `event_time` to crack
     CHECKPOINT = "checkpoint.npz"
     ONSET = "onset.npz"
 
