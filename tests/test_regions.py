@@ -151,7 +151,8 @@ def test_a_body_divided_in_name_only_is_the_same(kind: str, element: str) -> Non
         results.append([momentum.force(u), momentum.W, momentum.gamma, momentum.lumped_mass(0.1),
                         momentum.tangent(pattern, u), momentum.tangent(pattern, u, convex=True),
                         cauchy_stress(momentum, u), momentum.consistent_mass(pattern), np.array([taken]),
-                        np.array([momentum.energy]), np.array([momentum.stiffest(u, inverse)]), np.array([momentum.tiles.mean_force()])])
+                        np.array([momentum.energy]), np.array([momentum.stiffest(u, inverse)]),
+                        np.array([momentum.tiles.mean_force()])])
         tiles = momentum.tiles
         np.testing.assert_array_equal(tiles.untile(tiles.tile(space.w)), space.w)
     for one, two in zip(*results):
