@@ -47,9 +47,9 @@ def on_config(config: Any) -> Any:
 
 
 def on_files(files: Files, config: Any) -> Files:
-    """Take in the figures, and the pages at the top of the repository."""
-    for path in sorted((ROOT / "figures").glob("*.png")):
-        files.append(File.generated(config, f"figures/{path.name}", abs_src_path=str(path)))
+    """Take in the figures, the pictures of decks, and the pages at the top of the repository."""
+    for path in sorted((*ROOT.glob("figures/*.png"), *ROOT.glob("cases/*/*.png"))):
+        files.append(File.generated(config, path.relative_to(ROOT).as_posix(), abs_src_path=str(path)))
     for name, page in OUTSIDE.items():
         files.append(File.generated(config, page, content=(ROOT / name).read_text(encoding="utf-8")))
     for path in sorted((ROOT / "docs").glob("*.ipynb")):
@@ -84,7 +84,7 @@ def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
     def place(link: re.Match[str]) -> str:
         target = link[2]
         target = target.removeprefix("docs/") if there else target.removeprefix("../") if target.startswith(
-            ("../figures/", *(f"../{name}" for name in OUTSIDE))) else target
+            ("../figures/", "../cases/", *(f"../{name}" for name in OUTSIDE))) else target
         return link[1] + OUTSIDE.get(target, target)
 
     return LINK.sub(place, markdown)

@@ -1,0 +1,203 @@
+"""The decks that come with the program: found by name, checked, and against what is known of their scenes."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from types import ModuleType
+
+import meshio
+import numpy as np
+import pytest
+from plates import invoke_program, plate
+
+import skfsink.run
+from skfsink import shipped
+from skfsink.deck import read_deck
+from skfsink.errors import ParameterError
+from skfsink.material import SinkLaw
+from skfsink.meshing import write_mesh
+from skfsink.result import Result
+from skfsink.sample import data_folder, file_sample
+from skfsink.shipped import deck_name, deck_path, description, shipped_decks
+from skfsink.sweep import plan
+from skfsink.sweep.one import run_folder
+
+DECKS = ("biaxial_hole", "centre_crack", "pure_shear")
+
+
+def beside(name: str, script: str) -> ModuleType:
+    """A script that lies beside a deck."""
+    spec = importlib.util.spec_from_file_location(script, data_folder(name) / f"{script}.py")
+    assert spec and spec.loader
+    module = sys.modules[script] = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def loaded(name: str, mesh: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> Result:
+    """A deck on one of its meshes at its onset, and some nanoseconds more."""
+    monkeypatch.setattr(skfsink.run, "draw_run", lambda *_: None)
+    text = shipped_decks()[name].read_text()
+    text = re.sub(r'(?m)^mesh = "[^"]*"', f'mesh = "{data_folder(name) / "meshes" / mesh}.vtu"', text)
+    deck = folder / "deck.toml"
+    deck.write_text(re.sub(r'(?m)^event_time = "[^"]*"', 'event_time = "1 ns"', text))
+    return read_deck(deck).run(out=folder / "run", quiet=True)
+
+
+def one_by_one(folders: Sequence[Path], jobs: int) -> Iterator[Path]:
+    """Runs the folders of a sweep in this process."""
+    for folder in folders:
+        run_folder(folder)
+        yield folder
+
+
+# --- by name ---
+def test_each_deck_can_be_run() -> None:
+    """Fails if a deck is not found, cannot be read, or names a mesh, a boundary or a parameter that do not exist."""
+    assert set(shipped_decks()) == set(DECKS)
+    for name, path in shipped_decks().items():
+        deck = read_deck(path)
+        own, _ = deck.check()
+        sample = file_sample(Path(own["mesh"]))
+        assert all(sample.nodes(grip["boundary"]).size for grip in own["grips"])
+        assert (path.parent / "README.md").is_file() and (path.parent / "mesh.py").is_file()
+        assert len(description(path)) > 30, name
+
+
+def test_every_deck_beside_them_can_be_read() -> None:
+    """Fails if a variant of a deck has a mistake."""
+    for name in DECKS:
+        for path in data_folder(name).glob("*.toml"):
+            read_deck(path).check()
+
+
+def test_the_deck_of_the_page_can_be_read(tmp_path: Path) -> None:
+    """Fails if the deck that docs/decks.md explains has a table, a parameter or a unit that cannot be."""
+    page = (data_folder("pure_shear").parents[1] / "docs" / "decks.md").read_text(encoding="utf-8")
+    (text,) = re.findall(r"(?s)```toml\n(.*?)```", page)
+    (tmp_path / "deck.toml").write_text(text, encoding="utf-8")
+    own, options = read_deck(tmp_path / "deck.toml").check()
+    assert len(own["grips"]) == 2 and own["tractions"][0]["x"] == [[0.0, 0.0], [10.0, 0.02]]
+    assert own["regions"][0]["phi"] == 2.0 and options.element == "planestress"
+
+
+def test_a_name_stands_for_a_deck(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fails if a name is not taken for a shipped deck, a path is, or a file of that name does not go first."""
+    monkeypatch.chdir(tmp_path)
+    path = shipped_decks()["pure_shear"]
+    assert deck_path(Path("pure_shear")) == path and deck_name(path) == "pure_shear"
+    for other in (Path("own.toml"), Path("folder") / "pure_shear", path):
+        assert deck_path(other) == other
+    assert deck_name(Path("own.toml")) == "own"
+    (tmp_path / "pure_shear").mkdir()
+    assert deck_path(Path("pure_shear")) == path
+    (tmp_path / "centre_crack").write_text("")
+    assert deck_path(Path("centre_crack")) == Path("centre_crack")
+    with pytest.raises(ParameterError, match="one of biaxial_hole, centre_crack, pure_shear; got 'hole'"):
+        deck_path(Path("hole"))
+
+
+def test_commands_take_names(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fails if `list` leaves a deck out, or `run` and `sweep` do not compute the deck of a name, in its folder."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(skfsink.run, "draw_run", lambda *_: None)
+    status, _, out = invoke_program("list")
+    assert status == 0 and all(name in out for name in DECKS)
+    for command in (("run", "nothing"), ("sweep", "nothing", "--vary", "m=10")):
+        status, err, _ = invoke_program(*command)
+        assert status == 2 and err.count("\n") == 1 and "or one of biaxial_hole" in err
+    deck = tmp_path / "small" / "scene.toml"
+    deck.parent.mkdir()
+    write_mesh(deck.parent / "plate.vtu", plate(9))
+    deck.write_text('# Small.\ncase = "custom"\n[parameters]\nmesh = "plate.vtu"\nlength_scale = 0.9\n'
+                    'event_time = "1 us"\n[[grips]]\nboundary = "top"\ny = 1e-3\n[[grips]]\nboundary = "bottom"\n'
+                    'x = 0\ny = 0\n')
+    monkeypatch.setattr(shipped, "data_roots", lambda: (tmp_path,))
+    monkeypatch.setattr(plan, "here", one_by_one)
+    assert invoke_program("run", "small", "--quiet") == (0, "", "")
+    assert (tmp_path / "results" / "small" / "summary.json").is_file()
+    write_mesh(deck.parent / "other.vtu", plate(7))
+    assert invoke_program("sweep", "small", "--vary", "mesh=plate.vtu,other.vtu", "--quiet") == (0, "", "")
+    rows = (tmp_path / "results" / "sweep" / "small" / "sweep.csv").read_text().splitlines()
+    assert len(rows) == 3 and all("other.vtu" in row or "plate.vtu" in row for row in rows[1:])
+    first, second = ((tmp_path / "results" / "sweep" / "small" / f"mesh={name}.vtu" / "run" / "history.csv").read_text()
+                     for name in ("plate", "other"))
+    assert first != second == second
+
+
+# --- against what is known ---
+def test_hole_against_the_radially_symmetric_solution(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fails if stretch, stress or onset of the plate with a hole are not those of r^2 = R^2 + c.
+
+    The onset is where the stored energy at the rim is between what a body under homogeneous plane strain bears and
+    somewhat more than the limiter: a length l of the body has to reach it, and the energy falls with R^-4.
+    """
+    exact = beside("biaxial_hole", "closed_form")
+    result = loaded("biaxial_hole", "coarse", tmp_path, monkeypatch)
+    sides = result.summary["onset"]["displacement_mm"] / 2
+    hole = exact.moved_by(sides)
+    space, phi = result.scene.sample.space, SinkLaw().phi
+    moved = meshio.Mesh(np.column_stack([space.X, 0 * space.X[:, 0]]), [], {"displacement": result.state.u})
+    assert exact.rim_stretch(moved) == pytest.approx(exact.moved_by(1.005 * sides).stretch, rel=3e-3)
+    assert result.summary["onset"]["reaction_N_per_mm"] == pytest.approx(hole.far * (8 + 2 * sides), rel=0.05)
+    assert 0.77 * phi < hole.energy < 1.1 * phi
+
+
+def test_stress_concentration_of_the_solution() -> None:
+    """Fails if the solution for a hole has not twice the far stress at its rim for small strains (Kirsch)."""
+    exact = beside("biaxial_hole", "closed_form")
+    small = exact.Hole(1.0001)
+    assert small.hoop == pytest.approx(2 * small.far, rel=1e-3)
+    assert exact.moved_by(exact.Hole(1.2).displacement).stretch == pytest.approx(1.2, rel=1e-9)
+
+
+def test_strip_stores_the_energy_of_pure_shear(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fails if the strip ahead of the cut is not in pure shear, or the arms beside the cut bear load: G is not W H."""
+    tearing = beside("pure_shear", "tearing")
+    result = loaded("pure_shear", "cut2", tmp_path, monkeypatch)
+    space, W = result.scene.sample.space, result.state.W_max
+    x = space.X[space.conn].mean(axis=1)[:, 0]
+    expected = tearing.stored(1 + result.summary["onset"]["displacement_mm"] / 1.5)
+
+    def mean(part: np.ndarray) -> float:
+        return float((W * space.w)[part].sum() / space.w[part].sum())
+
+    assert mean((x > 4.5) & (x < 6)) == pytest.approx(expected, rel=0.005)
+    assert mean(x < 0.5) < 0.01 * expected
+
+
+def test_strips_have_the_same_tip() -> None:
+    """Fails if the meshes of the strip differ by more than the length of the cut and the height."""
+    base, *others = (file_sample(data_folder("pure_shear") / "meshes" / f"{name}.vtu")
+                     for name in ("cut2", "cut3", "cut4", "tall"))
+    tip = base.space.X[base.nodes("cut")]
+    for other, more in zip(others, ((1, 0), (2, 0), (0, 0.375))):
+        found = other.space.X[other.nodes("cut")]
+        assert np.allclose(np.sort(found, axis=0), np.sort(tip + more, axis=0), atol=1e-6)
+        assert np.ptp(other.space.X, axis=0) == pytest.approx([10 + more[0], 1.5 + 2 * more[1]])
+
+
+# --- cracks ---
+@pytest.mark.slow
+def test_tearing_of_the_strip(tmp_path: Path) -> None:
+    """Fails if a running crack does not take from the strip, per length, what Rivlin and Thomas say, or is too fast."""
+    tearing = beside("pure_shear", "tearing")
+    assert invoke_program("run", "pure_shear", "--out", tmp_path / "run", "--quiet")[0] == 0
+    found = tearing.figures(skfsink.load(tmp_path / "run"))
+    assert 0.7 * found["G"] < -found["elastic"] < 1.02 * found["G"]
+    assert found["sink"] + 2 * found["kinetic"] == pytest.approx(found["G"], rel=0.12)
+    assert 0.5 * 29.35 < found["speed"] < 1.1 * 29.35
+
+
+@pytest.mark.slow
+def test_cracks_of_the_wide_strip(tmp_path: Path) -> None:
+    """Fails if the two cracks are no mirror images, do not cross the strip, or the scheme feeds in energy."""
+    assert invoke_program("run", "centre_crack", "--out", tmp_path / "run", "--quiet")[0] == 0
+    run = skfsink.load(tmp_path / "run")
+    figures = beside("centre_crack", "speed").figures(run)
+    assert run.summary["event"]["separated"] and abs(figures["numerical"]) < 0.02
+    assert 0.6 < figures["speed"] / figures["c_s"] < 1.05
