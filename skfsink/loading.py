@@ -26,7 +26,7 @@ class Loading:
     Parameters
     ----------
     space: the mesh.
-    grips, tractions: each with the nodes of its boundary; of two grips that hold a node the later one moves it.
+    grips, tractions: each with the nodes of its boundary.
 
     Attributes
     ----------
@@ -37,7 +37,8 @@ class Loading:
     Raises
     ------
     ParameterError
-        A grip or traction has not as many components as the mesh, or a body under tractions can move as a whole.
+        A grip or traction has not as many components as the mesh, two grips move a node differently, or a body under
+        tractions can move as a whole.
     MeshError
         The mesh has no facet a traction could act on.
     """
@@ -46,12 +47,21 @@ class Loading:
                  tractions: Sequence[tuple[np.ndarray, Traction]] = ()) -> None:
         self._moves: list[tuple[np.ndarray, int, float | Ramp]] = []
         free = np.ones(space.X.shape, bool)
-        for nodes, grip in grips:
+        holders = np.full(space.X.shape, -1)  # number of the grip that holds a component of a node
+        for number, (nodes, grip) in enumerate(grips):
             if len(grip.velocity) != space.dim:
                 raise ParameterError(f"grip {grip.boundary} must have {space.dim} components, as the mesh; got "
                                      f"{len(grip.velocity)}")
             for i, value in enumerate(grip.velocity):
                 if value is not None:
+                    for other in np.setdiff1d(holders[nodes, i], -1):
+                        if (there := grips[other][1]).velocity[i] != value:
+                            at = space.X[nodes[holders[nodes, i] == other][0]]
+                            raise ParameterError(
+                                f"grips {there.boundary} and {grip.boundary} both hold {_AXES[i]} of the node at "
+                                f"({', '.join(f'{x:.3g}' for x in at)}) and move it differently: leave {_AXES[i]} out "
+                                f"of one of them, or end one of the boundaries short of the other")
+                    holders[nodes, i] = number
                     free[nodes, i] = False
                     self._moves.append((nodes, i, value))
         self.free = free.ravel()

@@ -240,11 +240,12 @@ class Scene:
 
     @property
     def fingerprint(self) -> str:
-        """Hash of all that decides the results of the run: the parameters, and the mesh but for where its file is."""
+        """Hash of all that decides the results of the run: parameters, loads, regions, and the mesh, wherever it is."""
         text = replace(self, parameters={**self.parameters, "mesh": ""}, choice={}).toml()
         hashed, space = hashlib.sha256(text.encode()), self.sample.space
         for array in (space.X, space.conn, *(nodes for _, nodes in sorted(self.sample.boundaries.items()))):
             hashed.update(array.tobytes())
+        hashed.update(f"{self.grips} {self.rollers} {self.tractions}".encode())
         for region in self.regions:
             hashed.update(f"{region.name} {region.material} {region.sink_law}".encode() + region.elements.tobytes())
         return hashed.hexdigest()

@@ -17,6 +17,8 @@ import skfsink.run
 from skfsink.cases.custom import _scene, custom
 from skfsink.deck import read_deck
 from skfsink.errors import MeshError, ParameterError, SkfsinkError
+from skfsink.loader import load
+from skfsink.loading import Loading
 from skfsink.loads import Grip, Ramp, Traction
 from skfsink.material import LIMITERS, MATERIALS, Gent, HolzapfelGasserOgden, constants_text, read_constants
 from skfsink.meshing import write_mesh
@@ -278,3 +280,38 @@ def test_any_tables(folder: Path, tables: dict[str, Any]) -> None:
 def test_five_thousand_tables(folder: Path, tables: dict[str, Any]) -> None:
     """Fails as the test before, on more of them."""
     check_tables(folder, tables)
+
+
+def test_grips_that_move_a_node_differently_are_refused(folder: Path) -> None:
+    """Fails if of two grips with a common corner one silently loses it, or grips that agree there are refused."""
+    space = file_sample(folder / "plate.vtu").space
+    X = space.X
+    bottom, right = np.flatnonzero(X[:, 1] == 0), np.flatnonzero(X[:, 0] == 4.0)
+    with pytest.raises(ParameterError, match=r"grips bottom and right both hold x of the node at \(4, 0\)"):
+        Loading(space, [(bottom, Grip("bottom", (0.0, 0.0))), (right, Grip("right", (1e-3, None)))])
+    for x in (0.0, None):
+        Loading(space, [(bottom, Grip("bottom", (x, 0.0))), (right, Grip("right", (0.0, None)))])
+
+
+def test_a_deck_with_a_region_a_ramp_and_a_traction_runs(folder: Path) -> None:
+    """Fails if what a deck says of regions, ramps and tractions does not reach the run, or is lost in resuming it."""
+    mesh = plate()
+    middle = mesh.points[mesh.cells_dict["quad"]].mean(axis=1)
+    mesh.cell_sets["half"] = [np.flatnonzero(middle[:, 0] > 2.0), np.zeros(0, int)]
+    write_mesh(folder / "plate.vtu", mesh)
+    text = HEAD + ('[[grips]]\nboundary = "bottom"\nx = 0\ny = [["0 s", "0 mm"], ["10 s", "-0.02 mm"]]\n'
+                   '[[tractions]]\nboundary = "top"\ny = "2 kPa/s"\n'
+                   '[[regions]]\nname = "half"\nmaterial = "neo-hookean"\nphi = "100 kPa"\nconstants = "mu = 2 MPa"\n')
+    assert invoke_program("run", deck(folder, text), "--out", "run", "--quiet")[0] == 0
+    run = load(folder / "run")
+    assert 10.0 in run.history["time_s"] and (run.history["loads"] < 0).any()
+    # the load is the resultant of the traction: 4 mm of 2 kPa/s
+    loading = run.history["phase"] == "loading"
+    assert run.history["reaction_N_per_mm"][loading] == pytest.approx(0.008 * run.history["time_s"][loading], rel=1e-6)
+    assert set(run.frames[0].cell_data["region"][0]) == {0, 1}
+    region = run.scene.regions[0]
+    assert region.sink_law.phi == 0.1 and region.material.shear_modulus == pytest.approx(2.0)
+    assert run.summary["energy"]["balance_error_relative"] < 1e-6
+    before = contents(folder / "run" / "series")
+    assert invoke_program("resume", "run", "--quiet")[0] == 0
+    assert contents(folder / "run" / "series") == before

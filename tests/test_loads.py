@@ -155,7 +155,7 @@ def test_ledger_of_the_loading_closes_as_the_trapezoidal_rule() -> None:
     """Fails if loads or work of changing dead loads are wrong: the balance falls with the square of the increment."""
     errors = []
     for increment in (0.02, 0.01, 0.005):
-        body = Loaded(notched(9), (Grip("y-", (0.0, 0.0)), Grip("x+", (0.002, None))),
+        body = Loaded(notched(9), (*rollers(2), Grip("x+", (0.002, None))),
                       (Traction("y+", (0.01, 0.1)),), increment=increment)
         state = body.load(2.0)
         momentum = body.momentum
@@ -260,7 +260,7 @@ def test_plate_torn_by_a_traction_closes_its_ledger(integrator: str) -> None:
     way, allowed = (3e-4, 1e-10) if integrator == "explicit" else (3e-6, 1e-8)
     quick = Ramp((0.0, 1.0, 1.0 + 1e-5, 1.0 + 2e-5), (0.0, 0.5, 0.5, 0.25))
     push = Ramp((0.0, 1.0 + 1e-5, 1.0 + 1.3e-5, 2.0), (0.0, 0.0, way, way))
-    grips = Grip("y-", (0.0, 0.0)), Grip("x+", (push, None))
+    grips = *rollers(2), Grip("x+", (push, None))
     body = Loaded(notched(9), grips, (Traction("y+", (0.0, quick)),), law=SinkLaw(phi=0.1))
     state = body.load()
     assert state.grip < 1.0 and state.gamma.min() < 0.99
@@ -280,7 +280,7 @@ def test_plate_torn_by_a_traction_closes_its_ledger(integrator: str) -> None:
         np.testing.assert_allclose(x, push.value(state.grip), atol=1e-10)
     assert {1.0 + 1e-5, 1.0 + 1.3e-5, 1.0 + 2e-5} <= set(times)
     assert state.deleted.sum() > 3 and state.ledger.sink > 0.1 * scale and state.ledger.loads < 0
-    assert abs(state.ledger.numerical) < 0.05 * scale
+    assert abs(state.ledger.numerical) < (0.05 if integrator == "explicit" else 0.2) * scale  # HHT damps the jumps
 
 
 @pytest.mark.parametrize("integrator", ["explicit", "hht", "single"])
