@@ -18,7 +18,7 @@ import pytest
 from PIL import Image
 from plates import invoke_program, plate
 
-from skfsink.deck import parameters_of
+from skfsink.deck import parameters_of, read_deck
 from skfsink.errors import OutputError, ParameterError
 from skfsink.meshing import write_mesh
 from skfsink.sweep.one import run_folder
@@ -222,3 +222,34 @@ def test_a_worker_that_is_killed_loses_nothing_and_repeats_nothing(
     assert all(row["onset_load [N/mm]"] and not row["failure"] for row in rows)
     assert starts(out).count("begun") == 4
     assert starts(out).count("resumed") == 1
+
+
+# --- the ensemble that is shipped ---
+ENSEMBLE = Path(__file__).resolve().parents[1] / "cases" / "single_edge_notch" / "ensemble"
+
+
+def test_the_ensemble_is_what_its_page_says(tmp_path: Path) -> None:
+    """Fails if a figure of the page is not that of the table, or the deck is not of twenty meshes of one size."""
+    with (ENSEMBLE / "sweep.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [int(row["mesh_seed"]) for row in rows] == list(range(1, 21)) and not any(row["failure"] for row in rows)
+    assert read_deck(ENSEMBLE / "scene.toml").parameters == {"mesh": "M3"}
+    page = (ENSEMBLE / "README.md").read_text(encoding="utf-8")
+    lines = [line.strip("| ").split(" | ") for line in page.splitlines() if line.startswith("| ")][1:]
+    columns = ("U [N mm/mm]", "D [N mm/mm]", "tip_speed [m/s]", "branches", "onset_displacement [mm]")
+    assert len(lines) == len(columns)
+    for column, (_, *shown) in zip(columns, lines):
+        values = np.array([float(row[column]) for row in rows])
+        for text, value in zip(shown, (values.mean(), values.std(ddof=1), values.min(), values.max())):
+            assert abs(float(text) - value) <= 0.51 * 10.0 ** -len(text.partition(".")[2]), (column, text, value)
+
+
+def test_an_ensemble_is_drawn_against_its_seeds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fails if figures of an ensemble are not drawn over the band of their mean and standard deviation."""
+    drawn: list[tuple[float, float]] = []
+    monkeypatch.setattr("matplotlib.axes.Axes.axhspan", lambda _, low, high, **__: drawn.append((low, high)))
+    rows = [{"mesh_seed": i, "analysis": "dynamic", "U": 1.0 + i, "D": 1.0, "tip_speed": 2.0, "branches": i}
+            for i in range(3)]
+    draw(rows, ["mesh_seed"], tmp_path / "sweep.png")
+    assert drawn[0] == pytest.approx((1.0, 3.0)) and len(drawn) == 4
+    assert (tmp_path / "sweep.png").stat().st_size > 10_000
