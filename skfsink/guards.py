@@ -79,6 +79,7 @@ class Guard:
     LOCKS = 50.0           # k/mu past which the plain element is warned of
     STIFF = 2e4            # k/mu past which rounding comes near the equilibria
     COARSE = 1.2           # l/h below which the mesh decides where and when it cracks
+    NARROW = 0.1           # width of an element, of the median one, below which it governs the explicit step
     SHARP = 60.0           # degrees by which a notch may turn at one node
     CHECKERED = 0.1        # amplitude of an alternating pressure, of mu
     FLAT = 0.2             # J below which a live point is close to being turned inside out
@@ -127,6 +128,18 @@ class Guard:
             log.warning("a notch turns by %.0f degrees at one node, at %s mm (above %g): it is as sharp as elements "
                         "are small, which moves onset and U; round it with at least 4 elements", angle,
                         _place(place), self.SHARP)
+        c = self.scene.controls
+        if c.analysis != "quasistatic" and c.integrator == "explicit":
+            self._check_widths()
+
+    def _check_widths(self) -> None:
+        """Elements that cut the explicit step for all others."""
+        widths = indicators.widths(self.space)
+        typical, e = float(np.median(widths)), int(np.argmin(widths))
+        if widths[e] < self.NARROW * typical:
+            log.warning("an element near %s mm is %.2g mm narrow, most are %.2g mm (a share less than %g): it makes the "
+                        "explicit step that much shorter for all; mend the mesh there, or take --integrator hht",
+                        _place(self.space.X[self.space.conn[e]].mean(axis=0)), widths[e], typical, self.NARROW)
 
     def check_onset(self, state: State) -> None:
         """Look at the state at the onset: where it will crack, and whether it is an equilibrium worth starting from.

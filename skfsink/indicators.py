@@ -65,6 +65,17 @@ def size_near(space: Space, node: int, radius: float) -> float:
     return float(space.h[near[space.conn].any(axis=1)].mean())
 
 
+def widths(space: Space) -> np.ndarray:
+    """Width of the elements [mm], (ne,): their size across the longest edge or face; waves cross it first."""
+    x = space.X[space.conn]
+    na, dim = space.conn.shape[1], space.dim
+    ends = [(a, a + 2**i) for i in range(dim) for a in range(na) if not a >> i & 1]
+    edges = np.stack([np.linalg.norm(x[:, b] - x[:, a], axis=1) for a, b in ends], axis=1)
+    along = edges.reshape(len(x), dim, -1).max(axis=2)  # longest of each reference direction
+    width: np.ndarray = space.V / np.sort(along, axis=1)[:, 1:].prod(axis=1)
+    return width
+
+
 def inverted(space: Space, u: np.ndarray, gamma: np.ndarray) -> tuple[int, float]:
     """Gauss points with gamma > 0 and J <= 0 at the displacement `u`: their number, and the greatest gamma there.
 

@@ -54,6 +54,14 @@ def coarse_right() -> Sample:
     return Sample("graded", space, {"top": np.flatnonzero(y > 1 - 1e-9), "bottom": np.flatnonzero(y < 1e-9)})
 
 
+def squeezed(share: float) -> Sample:
+    """Fifteen by fifteen elements, one column of which has only that share of the width of the others."""
+    x = np.cumsum(np.r_[0.0, np.where(np.arange(15) == 7, share, 1.0)])
+    space = Space(skfem.MeshQuad.init_tensor(x / 15, np.linspace(0, 1, 16)))
+    y = space.X[:, 1]
+    return Sample("squeezed", space, {"top": np.flatnonzero(y > 1 - 1e-9), "bottom": np.flatnonzero(y < 1e-9)})
+
+
 @pytest.mark.parametrize(("of", "message"), [
     (lambda: scene(), None),
     (lambda: scene(element="plain"), r"plain element locks at k/mu = 405.* take --element jbar"),
@@ -64,6 +72,10 @@ def coarse_right() -> Sample:
     (lambda: scene(block(11)), r"no element is finer than h = 0.0909 mm, l/h = 1.10 .* refine it to h <= l/3"),
     (lambda: scene(block(16, notch=0.4, width=0.0)), r"a notch turns by 180 degrees at one node, at \(0.375, 0.5\)"),
     (lambda: scene(block(15, notch=0.4, width=0.06)), SHARP + r".* round it with at least 4 elements"),
+    (lambda: scene(squeezed(0.11)), None),
+    (lambda: scene(squeezed(0.09)), r"an element near \(0.47, 0\.\d+\) mm is 0.006 mm narrow, most are 0.067 mm .*"
+                                    r"mend the mesh there"),
+    (lambda: scene(squeezed(0.09), analysis="quasistatic"), None),
 ])
 def test_scene_beyond_the_methods_is_warned_of(of: Callable[[], Scene], message: str | None,
                                                caplog: pytest.LogCaptureFixture):
