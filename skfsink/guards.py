@@ -137,8 +137,8 @@ class Guard:
         widths = indicators.widths(self.space)
         typical, e = float(np.median(widths)), int(np.argmin(widths))
         if widths[e] < self.NARROW * typical:
-            log.warning("an element near %s mm is %.2g mm narrow, most are %.2g mm (a share less than %g): it makes the "
-                        "explicit step that much shorter for all; mend the mesh there, or take --integrator hht",
+            log.warning("an element near %s mm is %.2g mm narrow, most are %.2g mm (a share less than %g): it makes "
+                        "the explicit step that much shorter for all; mend the mesh there, or take --integrator hht",
                         _place(self.space.X[self.space.conn[e]].mean(axis=0)), widths[e], typical, self.NARROW)
 
     def check_onset(self, state: State) -> None:
