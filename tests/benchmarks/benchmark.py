@@ -27,7 +27,7 @@ from typing import Any
 
 import numpy as np
 import skfem
-from limits import limits, reached
+from limits import FORCE_BYTES, STEP_BYTES, limits, reached
 
 from skfsink import kernels
 from skfsink.density import DensitySolver
@@ -97,7 +97,7 @@ def machine_limits() -> dict[str, Any]:
             u, out = 0.02 * np.sin(3 * space.X), np.empty_like(space.X)
             force = timed(lambda m=momentum, u=u, out=out: m.force(u, out), 60)["min_ms"]
             row[f"force {dim}D"] = {"elements": space.n_elements, "ms": force,
-                                    **reached(dim, space.n_elements, force, most)}
+                                    **reached(dim, space.n_elements, force, most, FORCE_BYTES[dim])}
     return report
 
 
@@ -132,7 +132,7 @@ def _steps(threads: int) -> dict[str, Any]:
     return {"gauss_points": points, "step_ms": ms, "step_with_gamma_ms": everything["median_ms"] / 20,
             "gauss_point_updates_per_second": points / ms * 1e3,
             "best_gauss_point_updates_per_second": points * 20 / mechanics["min_ms"] * 1e3,
-            "share": reached(2, sample.space.n_elements, ms, limits(threads))}
+            "share": reached(2, sample.space.n_elements, ms, limits(threads), STEP_BYTES[2])}
 
 
 def gamma() -> dict[str, Any]:
