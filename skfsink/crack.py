@@ -193,19 +193,22 @@ class CrackTracker:
         for k in sorted(range(count), key=lambda k: -level[k]):
             reach[k] = max([level[k]] + [reach[b] for b in above[k]])
         ends = [k for k in range(count) if not above[k]]
-        kept = []
-        for k in sorted(ends, key=lambda k: -level[k]):
-            fork, rival = k, False
-            while below[fork]:
-                fork = min(below[fork])
-                if any(reach[b] > reach[k] or (reach[b] == reach[k] and b != k and b in kept) for b in above[fork]
-                       ) or len(above[fork]) > 1:
-                    rival = True
+        kept, taken = [], set()   # taken: pieces on the way to an end that is kept
+        farthest = np.zeros(count)
+        np.maximum.at(farthest, piece, distance)
+        for k in sorted(ends, key=lambda k: -farthest[k]):
+            way = [k]
+            while below[way[-1]]:
+                fork = min(below[way[-1]])
+                if any(reach[b] > reach[k] or (reach[b] == reach[k] and b in taken)
+                       for b in above[fork] if b != way[-1]):
+                    if level[k] - level[fork] < 2.5:  # roughness of the flank of a longer arm
+                        way = []
                     break
-            if not rival or level[k] - level[fork] >= 2.5:
+                way.append(fork)
+            if way:
                 kept.append(k)
-        if not kept:
-            kept = [max(ends, key=lambda k: level[k])]
+                taken.update(way)
         return np.array([np.flatnonzero(piece == k)[np.argmax(distance[piece == k])] for k in sorted(kept)])
 
     def _apart(self, gamma: np.ndarray) -> bool:

@@ -80,3 +80,20 @@ def test_branches_and_tip_speed() -> None:
         forked[arm | np.roll(arm, 1)] = 0.0
     track.mark(41e-6, forked)
     assert track.look(41e-6, forked).branches == 2
+
+
+def test_leading_tip_is_kept_where_it_forks() -> None:
+    """Fails if the tip is taken for roughness as long as the arms of a fresh fork are short, and an old arm leads."""
+    track, space = tracker()
+    X = space.X
+
+    def column(x: float, y0: float, y1: float) -> np.ndarray:
+        return np.where((np.abs(X[:, 0] - x) < 1e-9) & (X[:, 1] > y0 - 1e-9) & (X[:, 1] < y1 + 1e-9), 0.0, 1.0)
+
+    old = np.minimum(line(space, 0, 1.2), column(0.3, 0.5, 0.9))
+    fork = np.minimum(column(1.2, 0.35, 0.65), np.minimum(line(space, 1.2, 1.3, 0.65), line(space, 1.2, 1.25, 0.35)))
+    for time, gamma in ((1e-6, line(space, 0, 0.0)), (2e-6, old), (3e-6, np.minimum(old, fork))):
+        track.mark(time, gamma)
+        tips = track.look(time, gamma)
+    np.testing.assert_allclose(tips.position, (1.3, 0.65))
+    assert tips.branches == 2  # the old arm and the new tip; the shorter arm of the fork may yet be roughness
