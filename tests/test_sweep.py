@@ -253,3 +253,12 @@ def test_an_ensemble_is_drawn_against_its_seeds(tmp_path: Path, monkeypatch: pyt
     draw(rows, ["mesh_seed"], tmp_path / "sweep.png")
     assert drawn[0] == pytest.approx((1.0, 3.0)) and len(drawn) == 4
     assert (tmp_path / "sweep.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize("name", ["run.lock", "starts.log"])
+def test_files_of_a_run_that_cannot_be_written_are_one_line(name: str, tmp_path: Path) -> None:
+    """Fails if a folder of a sweep that cannot be written to is a traceback in its process."""
+    (tmp_path / "deck.toml").write_text('case = "simple_shear"\n')
+    (tmp_path / name).mkdir()
+    with pytest.raises(OutputError, match=rf"cannot write .*{name}: Is a directory"):
+        run_folder(tmp_path)

@@ -15,6 +15,7 @@ from pathlib import Path
 
 from ..deck import read_deck
 from ..errors import SkfsinkError
+from ..files import reported, write_atomic
 from ..run import SCENE, SUMMARY
 
 __all__ = ["DECK", "FAILURE", "RUN", "finished", "run_folder"]
@@ -37,20 +38,22 @@ def run_folder(folder: Path) -> None:
         resumed = (run / SCENE).is_file()
         if not resumed and run.exists():
             shutil.rmtree(run)  # killed before there was anything to resume
-        with (folder / LOG).open("a") as log:
+        with reported(f"cannot write {folder / LOG}"), (folder / LOG).open("a") as log:
             log.write("resumed\n" if resumed else "begun\n")
         deck = read_deck(folder / DECK)
         try:
             deck.run(quiet=True, **({"resume": run} if resumed else {"out": run}))
         except SkfsinkError as error:
             if type(error).__name__ != "Interrupted":
-                (folder / FAILURE).write_text(f"{error}\n", encoding="utf-8")
+                write_atomic(folder / FAILURE, f"{error}\n")
             raise
 
 
 @contextmanager
 def _locked(path: Path) -> Iterator[None]:
-    with path.open("w") as lock:
+    with reported(f"cannot write {path}"):
+        lock = path.open("w")
+    with lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         yield
 
