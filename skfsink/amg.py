@@ -45,14 +45,19 @@ class AmgCG:
                 csr_array(intact), strength=("symmetric", {"theta": 0.0}), improve_candidates=None, max_coarse=200)
         finally:
             np.random.set_state(state)
-        self._P: csr_array | None = None
+        self.nodes = np.arange(intact.shape[0], dtype=np.uint32)  #: unknowns it works on
         if len(levels.levels) > 1:
             self._correct_on(csr_array(levels.levels[0].P), csr_array(levels.levels[1].A))
+        else:
+            self._correct_on(csr_array((intact.shape[0], 0)), csr_array((0, 0)))
 
     def _correct_on(self, P: csr_array, coarse: csr_array) -> None:
-        """Take `coarse` as the second level, with the prolongation P."""
-        self._P, self._R, self._coarse_matrix = P, csr_array(P.T), coarse
+        """Take `coarse` as the second level, with the prolongation P, (unknowns it works on, coarse ones)."""
+        self._P, self._coarse_matrix = P, coarse
         self._coarse: Callable[[np.ndarray], np.ndarray]
+        if coarse.shape[0] == 0:
+            self._coarse = np.copy
+            return
         if coarse.shape[0] <= self.DIRECT_COARSE:
             self._coarse = sla.splu(csc_array(coarse), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
                                     options={"SymmetricMode": True}).solve
@@ -66,13 +71,12 @@ class AmgCG:
         self._coarse = cycle.matvec
 
     def restricted(self, nodes: np.ndarray) -> AmgCG:
-        """The same for the principal block of the unknowns `nodes`: their part of the hierarchy, none made anew."""
+        """The same for the unknowns `nodes`, the others kept: their part of the hierarchy, none made anew."""
         part = copy.copy(self)
-        part._diagonal0 = self._diagonal0[nodes]
-        if self._P is not None:
-            P = self._P[nodes]
-            used = np.unique(P.indices)
-            part._correct_on(csr_array(P[:, used]), csr_array(self._coarse_matrix[used][:, used]))
+        part.nodes = nodes.astype(np.uint32)
+        P = self._P[nodes]
+        used = np.unique(P.indices)
+        part._correct_on(csr_array(P[:, used]), csr_array(self._coarse_matrix[used][:, used]))
         return part
 
     def _radius(self, intact: csr_array) -> float:
@@ -89,56 +93,50 @@ class AmgCG:
         """Mask of the unknowns whose sink has grown so far that the coarse level leaves them out."""
         return self.DEAD * self._diagonal0 <= D
 
-    def solve(self, A: csr_array, D: np.ndarray, b: np.ndarray, x: np.ndarray, tolerance: float | None = None,
-              size: float | None = None) -> np.ndarray | None:
+    def solve(self, A: csr_array, D: np.ndarray, b: np.ndarray, x: np.ndarray,
+              tolerance: float | None = None) -> np.ndarray | None:
         """Solution of A x = b from the guess `x`; None if it did not converge in `max_iterations`.
 
         `D` is the diagonal of A. It ends at a residual of `tolerance` (that of the solver if not given) relative to
-        `size`, by default the norm of b.
+        the norm of b.
         """
-        smoother = self.omega / D
-        live = (~self.dead(D)).astype(float)
-        indptr, indices, data = unsigned(A)
-        tolerance, size = tolerance or self.tolerance, size or float(np.linalg.norm(b))
-        r = np.empty_like(b)
-        x = x.copy()
+        tolerance, size = tolerance or self.tolerance, float(np.linalg.norm(b))
         # one Jacobi sweep puts the unknowns with a huge diagonal where they belong
-        _residual(indptr, indices, data, x, b, r)
-        x += r / D
+        x = x + residual(A, x, b) / D
         total = 0
         for attempt in range(3):
-            _residual(indptr, indices, data, x, b, r)
+            r = residual(A, x, b)
             self.residual = float(np.linalg.norm(r)) / size
             if self.residual <= tolerance or attempt == 2:
                 break
-            if self._iterate(A, r, x, smoother, live, tolerance * size) is None:
+            if not self.iterate(A, D, r, x, tolerance * size):
                 return None
             total += self.iterations
         self.iterations = total
         return x if self.residual <= 2 * tolerance else None
 
-    def _iterate(self, A: csr_array, r: np.ndarray, x: np.ndarray, smoother: np.ndarray, live: np.ndarray,
-                 target: float) -> bool | None:
-        indptr, indices, data = unsigned(A)
-        z, t, q = np.empty_like(r), np.empty_like(r), np.empty_like(r)
-        p = np.zeros_like(r)
+    def iterate(self, A: csr_array, D: np.ndarray, r: np.ndarray, x: np.ndarray, target: float) -> bool:
+        """Iterate on `x`, whose residual is `r`, both changed in place, until the norm of r over `nodes` is `target`.
+
+        Only the values at `nodes` are changed. False if it did not converge.
+        """
+        matrix, P, nodes = unsigned(A), unsigned(self._P), self.nodes
+        smoother, live = self.omega / D, ~self.dead(D)
+        z, t, p, q = (np.zeros_like(r) for _ in range(4))  # zero outside of `nodes`
+        coarse = np.empty(self._P.shape[1])
         rz_old, self.iterations = 1.0, 0
+        _advance(nodes, 0.0, p, q, x, r, smoother, z)
         while self.iterations < self.max_iterations:
-            np.multiply(smoother, r, out=z)
-            if self._P is not None:
-                _masked_residual(indptr, indices, data, z, r, live, t)
-                z += live * (self._P @ self._coarse(self._R @ t))
-            rz = _smooth(indptr, indices, data, z, r, smoother, t)  # t = smoothed z
-            p *= rz / rz_old
-            p += t
-            rz_old = rz
-            pq = _product(indptr, indices, data, p, q)
+            _restrict(nodes, *matrix, z, r, live, *P, coarse)
+            rz = _correct_and_smooth(nodes, *matrix, z, r, smoother, live, *P, self._coarse(coarse), t)
+            pq = _direction(nodes, *matrix, rz / rz_old, t, p, q)
             if not (np.isfinite(pq) and pq > 0.0):
-                return None
+                return False
+            rz_old = rz
             self.iterations += 1
-            if _advance(rz / pq, p, q, x, r) <= target:
+            if _advance(nodes, rz / pq, p, q, x, r, smoother, z) <= target:
                 return True
-        return None
+        return False
 
 
 def residual(A: csr_array, x: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -148,6 +146,8 @@ def residual(A: csr_array, x: np.ndarray, b: np.ndarray) -> np.ndarray:
     return r
 
 
+# In the loops below a row of A is taken with the whole vector, which is zero outside of `nodes`. Row m of the
+# prolongation P (arrays start, column, weight) belongs to nodes[m].
 @njit(cache=True)
 def _row(indptr, indices, data, x, i):  # type: ignore[no-untyped-def]
     total = 0.0
@@ -163,37 +163,52 @@ def _residual(indptr, indices, data, x, b, r):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _masked_residual(indptr, indices, data, z, r, mask, t):  # type: ignore[no-untyped-def]
-    for i in range(z.size):
-        t[i] = mask[i] * (r[i] - _row(indptr, indices, data, z, i))
+def _restrict(nodes, indptr, indices, data, z, r, live, start, column, weight, coarse):  # type: ignore[no-untyped-def]
+    """coarse = P^T (r - A z) of the live nodes."""
+    coarse[:] = 0.0
+    for m in range(nodes.size):
+        i = nodes[m]
+        if live[i]:
+            value = r[i] - _row(indptr, indices, data, z, i)
+            for k in range(start[m], start[m + 1]):
+                coarse[column[k]] += weight[k] * value
 
 
 @njit(cache=True)
-def _smooth(indptr, indices, data, z, r, smoother, t):  # type: ignore[no-untyped-def]
-    """t = z + smoother (r - A z); returns r.t."""
+def _correct_and_smooth(nodes, indptr, indices, data, z, r, smoother, live,  # type: ignore[no-untyped-def]
+                        start, column, weight, coarse, t):
+    """z += P coarse at the live nodes, then t = z + smoother (r - A z); returns r.t."""
+    for m in range(nodes.size):
+        i = nodes[m]
+        if live[i]:
+            for k in range(start[m], start[m + 1]):
+                z[i] += weight[k] * coarse[column[k]]
     total = 0.0
-    for i in range(z.size):
+    for i in nodes:
         t[i] = z[i] + smoother[i] * (r[i] - _row(indptr, indices, data, z, i))
         total += r[i] * t[i]
     return total
 
 
 @njit(cache=True)
-def _product(indptr, indices, data, p, q):  # type: ignore[no-untyped-def]
-    """q = A p; returns p.q."""
+def _direction(nodes, indptr, indices, data, beta, t, p, q):  # type: ignore[no-untyped-def]
+    """p = t + beta p, q = A p; returns p.q."""
+    for i in nodes:
+        p[i] = t[i] + beta * p[i]
     total = 0.0
-    for i in range(p.size):
+    for i in nodes:
         q[i] = _row(indptr, indices, data, p, i)
         total += p[i] * q[i]
     return total
 
 
 @njit(cache=True)
-def _advance(alpha, p, q, x, r):  # type: ignore[no-untyped-def]
-    """x += alpha p, r -= alpha q; returns the norm of r."""
+def _advance(nodes, alpha, p, q, x, r, smoother, z):  # type: ignore[no-untyped-def]
+    """x += alpha p, r -= alpha q, z = smoother r; returns the norm of r."""
     total = 0.0
-    for i in range(x.size):
+    for i in nodes:
         x[i] += alpha * p[i]
         r[i] -= alpha * q[i]
+        z[i] = smoother[i] * r[i]
         total += r[i] * r[i]
     return np.sqrt(total)

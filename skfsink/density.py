@@ -67,10 +67,12 @@ class DensitySolver:
         self.pattern = Pattern(space)
         self.load = self._lump(np.ones_like(space.w))
         self._laplacian = kernels.laplacian(space, self.pattern, law.length_scale**2)
+        self._data, self._laplacian_diagonal = self._laplacian.copy(), self._laplacian[self.pattern.diagonal]
         self._direct: Factorization | None = None
         self._amg = AmgCG(self.pattern.matrix(self._assemble(np.ones_like(space.w))), tolerance)
         self.zone = ActiveZone(space.X, law.length_scale, self._amg) if active_zone and sink != "consistent" else None
         self.last_sink: np.ndarray | None = None  #: coefficients of the last solve, (ne, nq)
+        self._last_W = np.full_like(space.w, np.nan)  # history of the last solve; unknown after a restore
         self._residual = 0.0
         self.solves = self.skipped = self.iterations = self.fallbacks = 0
 
@@ -102,7 +104,7 @@ class DensitySolver:
         """
         if not np.isfinite(W_max.max()):  # infinite, it would make a dead point in silence
             raise ConvergenceError("the stored energy of a Gauss point is not finite: lower --courant or --hht-dt")
-        sink = 1.0 / (self._history(W_max) + self.law.epsilon)
+        sink = self._coefficients(W_max)
         if self.last_sink is not None and not _changed(sink, self.last_sink, self.unchanged):
             self.skipped += 1
             return gamma
@@ -117,7 +119,19 @@ class DensitySolver:
             raise ConvergenceError(f"the relative density left (0, 1]: {result.min():.3g} to {result.max():.6g}; the "
                                    f"mesh has elements so flat that the lumped sink loses its maximum principle")
         self.last_sink = sink
+        np.copyto(self._last_W, W_max)
         return result
+
+    def _coefficients(self, W_max: np.ndarray) -> np.ndarray:
+        """Sink coefficients 1/(H + eps), (ne, nq), computed anew where the history is not that of the last solve."""
+        if self.last_sink is None:
+            return 1.0 / (self._history(W_max) + self.law.epsilon)
+        sink, moved = self.last_sink.copy(), np.empty(len(W_max), bool)
+        _moved(W_max, self._last_W, moved)
+        for elements, law in self._parts:
+            mine = elements[moved[elements]]
+            sink[mine] = 1.0 / (law.history(W_max[mine]) + self.law.epsilon)
+        return sink
 
     def _history(self, W_max: np.ndarray) -> np.ndarray:
         """H of Eq. (10), (ne, nq), each element by its law."""
@@ -150,15 +164,14 @@ class DensitySolver:
     def restore(self, memory: dict[str, np.ndarray]) -> None:
         """Take up what :meth:`memory` gave."""
         self.last_sink = memory.get("last_sink")
-        if self.zone is not None and "zone_seen" in memory:
-            self.zone.restore(memory, self.pattern.matrix(self._laplacian))
+        if self.zone is not None and "zone_depths" in memory:
+            self.zone.restore(memory)
 
     def _assemble(self, sink: np.ndarray) -> np.ndarray:
         if self.sink == "consistent":
             return self._laplacian + kernels.weighted_mass(self.space, self.pattern, sink)
-        data = self._laplacian.copy()
-        data[self.pattern.diagonal] += self._lump(sink)
-        return data
+        self._data[self.pattern.diagonal] = self._laplacian_diagonal + self._lump(sink)
+        return self._data  # one array for all solves: only the diagonal changes
 
     def _lump(self, values: np.ndarray) -> np.ndarray:
         """Nodal sums (n,) of Gauss point values; of sink and load alike, so that H = 1 gives gamma = 1."""
@@ -193,3 +206,12 @@ def _changed(new, old, tolerance):  # type: ignore[no-untyped-def]
             if abs(new[e, q] - old[e, q]) > tolerance * old[e, q]:
                 return True
     return False
+
+
+@njit(cache=True)
+def _moved(new, old, moved):  # type: ignore[no-untyped-def]
+    for e in range(new.shape[0]):
+        moved[e] = False
+        for q in range(new.shape[1]):
+            if new[e, q] != old[e, q]:
+                moved[e] = True

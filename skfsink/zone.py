@@ -1,21 +1,37 @@
 """The active zone: where gamma changes while a crack runs, and the density solve restricted to it.
 
 The density equation carries a change of the sink over the length l: at a distance r it is felt by exp(-r/l). Between
-two solves the crack runs a few per cent of l, so gamma changes near its tips only. The zone is made of the nodes within
-some lengths l of where the equation is not met; outside gamma stays what it was. Whether that was right is measured:
-the residual of the *whole* system has to meet the target of a solve everywhere, or the zone's solution is only a guess
-for one.
+two solves the crack runs a few per cent of l, so gamma changes near its tips only. A zone is made of the nodes around
+where the equation is not met, by as many lengths l as the residual there takes to fade; outside gamma stays what it
+was. Whether that was right is measured: the residual of the *whole* system has to meet the target of a solve
+everywhere. What is left of it outside is taken up in another zone, and if that does not help, the zones' solution is
+only a guess for one everywhere.
+
+Zones are chosen by cells as wide as l. The depth of a cell is its distance from the end of the zone, at least. A
+zone serves later solves as long as all residuals are deep enough in it.
 """
 
 from __future__ import annotations
 
+import math
+from typing import NamedTuple
+
 import numpy as np
+from numba import njit
 from scipy.sparse import csr_array
-from scipy.spatial import cKDTree
 
 from .amg import AmgCG, residual
+from .direct import unsigned
 
 __all__ = ["ActiveZone"]
+
+
+class _Zone(NamedTuple):
+    """Depth of each cell [mm], zero outside; the nodes, ascending; the solver of their part of the system."""
+
+    depth: np.ndarray
+    nodes: np.ndarray
+    inner: AmgCG
 
 
 class ActiveZone:
@@ -29,29 +45,30 @@ class ActiveZone:
 
     Attributes
     ----------
-    nodes: the nodes of the zone, ascending; none before the first solve.
-    solves, misses: solves in the zone, and those of them whose residual outside was too large.
-    choices: how often the zone was chosen anew.
+    nodes: the nodes of the zone of the last solve, ascending; none before the first one.
+    solves: those made in zones.   misses: solutions in a zone whose residual outside was too large.
+    choices: how often a zone was chosen anew.
     residual: relative residual of the whole system after the last solve.
     """
 
-    RADIUS = 5.0     # lengths l around the sources that belong to the zone
-    MARGIN = 2.0     # lengths l by which the sources may move before it is chosen anew
-    RECENT = 15      # solves for which a source is remembered
-    MOST = 0.6       # of all nodes; a larger zone would not pay, and
-    PATIENCE = 10    # solves are made everywhere before another one is looked for
-    SHARE = 0.7      # of the target for the solve in the zone; the rest is for what is left outside
+    CELL = 1.0       # width of a cell, lengths l
+    RADIUS = 2.5     # lengths l around a node whose residual is the target of the whole system
+    DECADE = 1.2     # lengths l more for each decade by which it is larger
+    MARGIN = 3.0     # lengths l by which they may move before another zone is chosen
+    MOST = 0.6       # of all nodes; a larger zone would not pay
+    KEPT = 8         # zones, those used last
+    PASSES = 3       # zones one after the other in a solve
+    SHARE = 0.7      # of the target for the solve in a zone; the rest is for what is left outside
 
     def __init__(self, X: np.ndarray, length_scale: float, amg: AmgCG) -> None:
-        self._X, self._l, self._amg = X, length_scale, amg
+        self._l, self._amg = length_scale, amg
+        width = self.CELL * length_scale
+        cells, cell = np.unique(np.floor(X / width), axis=0, return_inverse=True)
+        self._centres, self._cell = width * np.ascontiguousarray(cells), cell.ravel()
+        self._zones: list[_Zone] = []  # the one used last at the end
         self.nodes = np.zeros(0, np.int64)
         self.solves = self.misses = self.choices = 0
         self.residual = 0.0
-        self._seen = np.full(len(X), -self.RECENT - 1, np.int64)  # number of the solve in which a node was a source
-        self._count = self._next = 0
-        self._from = np.zeros(len(X), bool)  # the sources the zone was chosen for
-        self._core = np.zeros(len(X), bool)  # where sources do not call for another choice
-        self._inner: AmgCG | None = None
 
     def solve(self, A: csr_array, D: np.ndarray, b: np.ndarray, x: np.ndarray,
               tolerance: float) -> tuple[np.ndarray, bool, int]:
@@ -59,77 +76,96 @@ class ActiveZone:
 
         One that does not is the best guess for a solve everywhere.
         """
-        size = float(np.linalg.norm(b))
-        dead = self._amg.dead(D)
-        x = x + np.where(dead, residual(A, x, b) / D, 0.0)  # these follow their sink
-        r = residual(A, x, b)
+        size, x, r = float(np.linalg.norm(b)), x.copy(), residual(A, x, b)
+        _settle(self._amg.dead(D), D, *unsigned(A), x, r)
         self.residual = float(np.linalg.norm(r)) / size
         if self.residual <= tolerance:
             return x, True, 0
-        self._count += 1
-        sources = self._sources(np.abs(r), 0.5 * tolerance * size)
-        self._seen[sources] = self._count
-        if self._count >= self._next and not self._core[sources].all():
-            self._choose(self._seen > self._count - self.RECENT, A)
-            if self._inner is None:  # there are too many of them
-                self._choose(sources, A)
-        if self._inner is None or not self._core[sources].all():
-            return x, False, 0
-        nodes = self.nodes
-        block = csr_array((A.data[self._take], self._indices, self._indptr), shape=(nodes.size,) * 2)
-        inside = self._inner.solve(block, D[nodes], b[nodes] - self._coupling @ x, x[nodes], self.SHARE * tolerance,
-                                   size)
-        if inside is None:
-            return x, False, self._inner.iterations
-        x[nodes] = inside
-        self.residual = float(np.linalg.norm(residual(A, x, b))) / size
-        self.solves += 1
-        met = self.residual <= 2 * tolerance
-        self.misses += not met
-        return x, met, self._inner.iterations
+        total = 0
+        for _ in range(self.PASSES):
+            zone = self._find(r, tolerance * size)
+            if zone is None:
+                return x, False, total
+            converged = zone.inner.iterate(A, D, r, x, self.SHARE * tolerance * size)
+            total += zone.inner.iterations
+            if not converged:
+                return x, False, total
+            r = residual(A, x, b)
+            self.residual = float(np.linalg.norm(r)) / size
+            if self.residual <= 2 * tolerance:
+                self.solves += 1
+                return x, True, total
+            self.misses += 1
+        return x, False, total
 
-    @staticmethod
-    def _sources(magnitude: np.ndarray, negligible: float) -> np.ndarray:
-        """Mask of the nodes with the largest residuals, such that the others have a norm below `negligible`."""
-        level = 0.3 * float(magnitude.max())
-        while True:
-            sources = magnitude > level
-            if float(np.linalg.norm(magnitude[~sources])) <= negligible:
-                return sources
-            level *= 0.3
-
-    def _choose(self, sources: np.ndarray, A: csr_array) -> None:
-        """Choose the zone around `sources` (mask)."""
-        self.choices += 1
-        self._from = sources
-        furthest = (self.RADIUS + self.MARGIN) * self._l
-        distance, _ = cKDTree(self._X[sources]).query(self._X, distance_upper_bound=furthest)
-        self._core = distance <= self.MARGIN * self._l
-        self.nodes = np.flatnonzero(np.isfinite(distance))
-        self._inner = None
-        if self.nodes.size > self.MOST * len(self._X):
-            self._next = self._count + self.PATIENCE
-            return
-        place = csr_array((np.arange(1, A.nnz + 1), A.indices, A.indptr), shape=A.shape)[self.nodes]
-        mine = np.zeros(len(self._X), bool)
-        mine[self.nodes] = True
-        block = place[:, self.nodes]
-        block.sort_indices()
-        self._take, self._indptr, self._indices = block.data - 1, block.indptr, block.indices
-        keep = ~mine[place.indices]
-        rows = np.repeat(np.arange(self.nodes.size), np.diff(place.indptr))[keep]
-        self._coupling = csr_array((A.data[place.data[keep] - 1], (rows, place.indices[keep])),
-                                   shape=(self.nodes.size, len(self._X)))
-        self._inner = self._amg.restricted(self.nodes)
+    def _find(self, r: np.ndarray, target: float) -> _Zone | None:
+        """The smallest zone kept that is deep enough for the residual `r`, or a new one; None if that is too large."""
+        need = np.zeros(len(self._centres))
+        _reach(r, self._cell, target, self.RADIUS * self._l, self.DECADE * self._l, need)
+        fit = [zone for zone in self._zones if (zone.depth >= need).all()]
+        if fit:
+            zone = min(fit, key=lambda zone: zone.nodes.size)
+            self._zones = [other for other in self._zones if other is not zone]
+        else:
+            depth = np.zeros_like(need)
+            _deepen(self._centres, np.flatnonzero(need), need, self.MARGIN * self._l, depth)
+            nodes = np.flatnonzero(depth[self._cell])
+            if nodes.size > self.MOST * self._cell.size:
+                return None
+            self.choices += 1
+            zone = _Zone(depth, nodes, self._amg.restricted(nodes))
+        self._zones = [*self._zones[-self.KEPT + 1:], zone]
+        self.nodes = zone.nodes
+        return zone
 
     # --- checkpoints ---
     def memory(self) -> dict[str, np.ndarray]:
-        """What decides the zone of the next solves, for a checkpoint."""
-        return {"zone_seen": self._seen, "zone_from": self._from, "zone_count": np.array([self._count, self._next])}
+        """What decides the zones of the next solves, for a checkpoint."""
+        return {"zone_depths": np.array([zone.depth for zone in self._zones]).reshape(-1, len(self._centres))}
 
-    def restore(self, memory: dict[str, np.ndarray], A: csr_array) -> None:
-        """Take up what :meth:`memory` gave; `A` is any matrix of the system, of which the couplings are taken."""
-        self._seen = memory["zone_seen"]
-        if memory["zone_from"].any():
-            self._choose(memory["zone_from"], A)
-        self._count, self._next = map(int, memory["zone_count"])
+    def restore(self, memory: dict[str, np.ndarray]) -> None:
+        """Take up what :meth:`memory` gave."""
+        for depth in memory["zone_depths"]:
+            nodes = np.flatnonzero(depth[self._cell])
+            self._zones.append(_Zone(depth, nodes, self._amg.restricted(nodes)))
+
+
+@njit(cache=True)
+def _settle(dead, D, indptr, indices, data, x, r):  # type: ignore[no-untyped-def]
+    """Let the values at `dead` nodes follow their sinks, and the residual r with them (A is symmetric)."""
+    for i in range(x.size):
+        if dead[i]:
+            change = r[i] / D[i]
+            x[i] += change
+            for k in range(indptr[i], indptr[i + 1]):
+                r[indices[k]] -= data[k] * change
+
+
+@njit(cache=True)
+def _reach(r, cell, target, radius, decade, need):  # type: ignore[no-untyped-def]
+    """Depth that the residual needs in each cell, but for its smallest values, whose norm is half of the target."""
+    squares = np.zeros(64)  # sums by powers of two, from 2^-48 of the target on
+    for value in r:
+        squares[min(max(math.frexp(value / target)[1] + 48, 0), 63)] += value * value
+    power, rest = 0, squares[0]
+    while power < 63 and rest + squares[power + 1] <= 0.25 * target * target:
+        power += 1
+        rest += squares[power]
+    level = 2.0 ** (power - 48) * target
+    for i in range(r.size):
+        if abs(r[i]) >= level:
+            need[cell[i]] = max(need[cell[i]], radius + decade * np.log10(abs(r[i]) / target))
+
+
+@njit(cache=True)
+def _deepen(centres, sources, need, margin, depth):  # type: ignore[no-untyped-def]
+    """Depth of all cells in the zone that reaches `need` and `margin` farther around each source."""
+    for s in sources:
+        reach = need[s] + margin
+        for c in range(depth.size):
+            square = 0.0
+            for i in range(centres.shape[1]):
+                square += (centres[c, i] - centres[s, i]) ** 2
+            least = reach - depth[c]
+            if least > 0.0 and square < least * least:
+                depth[c] = reach - np.sqrt(square)
