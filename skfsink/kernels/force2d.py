@@ -111,7 +111,7 @@ def _coefficients(ws, w, gamma, pressure, ab):  # type: ignore[no-untyped-def]
     for i in range(Q):
         a = 2.0 * w[i] * gamma[i] * ws[8 * Q + i] * ws[6 * Q + i]
         ab[i] = a
-        ab[Q + i] = w[i] * pressure[i] - a * ws[10 * Q + i] / ws[9 * Q + i] * (1 / 3.0)
+        ab[Q + i] = w[i] * pressure[i] - a * ws[10 * Q + i] * ws[9 * Q + i] * (1 / 3.0)
 
 
 @njit(fastmath=FAST)
@@ -162,11 +162,10 @@ def _energy(w, gamma, W, psi):  # type: ignore[no-untyped-def]
 
 @njit(fastmath=FAST)
 def least_live(J, gamma, least):  # type: ignore[no-untyped-def]
-    """The smaller of `least` and the least J at a point with gamma > 0."""
+    """Lower `least` to J where that is smaller and gamma > 0; by lane, as a single minimum would not vectorise."""
     for i in range(J.size):
         value = J[i] if gamma[i] > 0.0 else 1.0
-        least = value if value < least else least
-    return least
+        least[i] = value if value < least[i] else least[i]
 
 
 @njit(cache=True, fastmath=FAST, nogil=True)
@@ -176,14 +175,14 @@ def force_2d(law, constants, k_bulk, conn, x, geometry, gamma, j_bar, force, W, 
     t, p, ab = np.empty(4 * Q), np.empty(2 * LANES), np.empty(2 * Q)
     pressure, volumetric, ddpsi = np.empty(Q), np.empty(Q), np.empty(Q)
     J, I1, R, psi_q = ws[4 * Q:5 * Q], ws[5 * Q:6 * Q], ws[6 * Q:7 * Q], ws[7 * Q:8 * Q]
-    dpsi, floored = ws[8 * Q:9 * Q], ws[9 * Q:10 * Q]
-    least = 1.0
+    dpsi, floored = ws[8 * Q:9 * Q], ws[9 * Q:10 * Q]  # floored: J at first, then 1/J
+    least = np.ones(Q)
     for b in range(conn.shape[0]):
         geo, g = geometry[b].reshape(-1), gamma[b].reshape(-1)
         w = geo[4 * Q:]
         _gather(conn[b], x, z)
         _kinematics(z, geo, ws)
-        least = least_live(J, g, least)
+        least_live(J, g, least)
         guess_inverse_cbrt(floored.view(np.int64), R.view(np.int64))
         refine_inverse_cbrt(floored, R)
         _invariant(ws)
@@ -199,4 +198,4 @@ def force_2d(law, constants, k_bulk, conn, x, geometry, gamma, j_bar, force, W, 
         density = W[b].reshape(-1)
         _add(psi_q, volumetric, density)
         _energy(w, g, density, psi[b])
-    return least
+    return least.min()

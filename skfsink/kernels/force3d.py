@@ -136,10 +136,10 @@ def _coefficients(w, gamma, dpsi, R, pressure, ab):  # type: ignore[no-untyped-d
 
 
 @njit(fastmath=FAST)
-def _deviator(ab, tr, floored):  # type: ignore[no-untyped-def]
+def _deviator(ab, tr, inverse):  # type: ignore[no-untyped-def]
     Q = 8 * LANES
     for i in range(Q):
-        ab[Q + i] -= ab[i] * tr[i] / floored[i] * (1 / 3.0)
+        ab[Q + i] -= ab[i] * tr[i] * inverse[i] * (1 / 3.0)
 
 
 @njit(fastmath=FAST)
@@ -194,7 +194,7 @@ def force_3d(law, constants, k_bulk, conn, x, geometry, gamma, j_bar, force, W, 
     J, floored, tr, R, I1 = np.empty(Q), np.empty(Q), np.empty(Q), np.empty(Q), np.empty(Q)
     psi_q, dpsi, ddpsi, ab, mean = np.empty(Q), np.empty(Q), np.empty(Q), np.empty(2 * Q), np.empty(3 * L)
     pressure, volumetric = np.empty(Q), np.empty(Q)
-    least = 1.0
+    least = np.ones(Q)
     for tile in range(conn.shape[0]):
         geo, gam = geometry[tile].reshape(-1), gamma[tile].reshape(-1)
         w = geo[9 * Q:]
@@ -203,7 +203,7 @@ def force_3d(law, constants, k_bulk, conn, x, geometry, gamma, j_bar, force, W, 
             _gradient(z[8 * c * L:8 * (c + 1) * L], g)
             _push(g, geo, F[3 * c * Q:3 * (c + 1) * Q])
         _invariants(F, J, floored, tr)
-        least = least_live(J, gam, least)
+        least_live(J, gam, least)
         guess_inverse_cbrt(floored.view(np.int64), R.view(np.int64))
         refine_inverse_cbrt(floored, R)
         _product(R, tr, I1)
@@ -214,7 +214,7 @@ def force_3d(law, constants, k_bulk, conn, x, geometry, gamma, j_bar, force, W, 
         else:
             _dilatation_plain(gam, k_bulk, J, pressure, volumetric)
         _coefficients(w, gam, dpsi, R, pressure, ab)
-        _deviator(ab, tr, floored)
+        _deviator(ab, tr, floored)  # by now 1/J
         _piola(F, ab, P)
         density, out = W[tile].reshape(-1), force[tile].reshape(-1)
         for c in range(3):
@@ -222,4 +222,4 @@ def force_3d(law, constants, k_bulk, conn, x, geometry, gamma, j_bar, force, W, 
             _nodal_force(t, out[c * L:])
         _add(psi_q, volumetric, density)
         _energy(w, gam, density, psi[tile])
-    return least
+    return least.min()

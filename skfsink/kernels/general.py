@@ -25,7 +25,7 @@ _Q3 = 8 * LANES_3D
 
 
 @njit(fastmath=FAST)
-def _coefficients(w, gamma, pressure, R, floored, I, d, ab, c):  # type: ignore[no-untyped-def]
+def _coefficients(w, gamma, pressure, R, inverse, I, d, ab, c):  # type: ignore[no-untyped-def]
     """a and b without the part of I2' in a; the rows of c are e, then c_f of each family."""
     Q = R.size
     for i in range(Q):
@@ -33,12 +33,12 @@ def _coefficients(w, gamma, pressure, R, floored, I, d, ab, c):  # type: ignore[
         ab[i] = 2.0 * wg * d[0, i] * R[i]
         c[0, i] = 2.0 * wg * d[1, i] * R[i] * R[i]
         pull = 2.0 / 3.0 * d[0, i] * I[0, i] + 4.0 / 3.0 * d[1, i] * I[1, i]
-        ab[Q + i] = w[i] * pressure[i] - wg * pull / floored[i]
+        ab[Q + i] = w[i] * pressure[i] - wg * pull * inverse[i]
     for f in range(2, I.shape[0]):
         for i in range(Q):
             wg = w[i] * gamma[i]
             c[f - 1, i] = 2.0 * wg * d[f, i] * R[i]
-            ab[Q + i] -= 2.0 / 3.0 * wg * d[f, i] * I[f, i] / floored[i]
+            ab[Q + i] -= 2.0 / 3.0 * wg * d[f, i] * I[f, i] * inverse[i]
 
 
 # --- quadrilaterals in plane strain ---
@@ -89,13 +89,13 @@ def force_general_2d(law, constants, k_bulk, conn, x, geometry, gamma, fibres, j
     I, d, dd, c = np.empty((m, _Q)), np.zeros((m, _Q)), np.zeros((m, m, _Q)), np.empty((m - 1, _Q))
     J, R, psi_q = ws[4 * _Q:5 * _Q], ws[6 * _Q:7 * _Q], np.empty(_Q)
     floored, tr = ws[9 * _Q:10 * _Q], ws[10 * _Q:11 * _Q]
-    least = 1.0
+    least = np.ones(_Q)
     for b in range(conn.shape[0]):
         geo, g = geometry[b].reshape(-1), gamma[b].reshape(-1)
         w = geo[4 * _Q:]
         force2d._gather(conn[b], x, z)
         force2d._kinematics(z, geo, ws)
-        least = force2d.least_live(J, g, least)
+        force2d.least_live(J, g, least)
         guess_inverse_cbrt(floored.view(np.int64), R.view(np.int64))
         refine_inverse_cbrt(floored, R)
         _invariants_2d(ws, J, tr, R, fibres[b], I)
@@ -105,7 +105,7 @@ def force_general_2d(law, constants, k_bulk, conn, x, geometry, gamma, fibres, j
             force2d._spread(p, pressure, volumetric)
         else:
             force2d._dilatation_plain(g, k_bulk, J, pressure, volumetric)
-        _coefficients(w, g, pressure, R, floored, I, d, ab, c)
+        _coefficients(w, g, pressure, R, floored, I, d, ab, c)  # by now 1/J
         _second_2d(J, c, ab)
         force2d._stress(ws, geo, ab, t)
         _fibre_stress_2d(ws, geo, fibres[b], c, t)
@@ -113,7 +113,7 @@ def force_general_2d(law, constants, k_bulk, conn, x, geometry, gamma, fibres, j
         density = W[b].reshape(-1)
         force2d._add(psi_q, volumetric, density)
         force2d._energy(w, g, density, psi[b])
-    return least
+    return least.min()
 
 
 # --- hexahedra ---
@@ -188,7 +188,7 @@ def force_general_3d(law, constants, k_bulk, conn, x, geometry, gamma, fibres, j
     J, floored, tr, R, psi_q = np.empty(Q), np.empty(Q), np.empty(Q), np.empty(Q), np.empty(Q)
     I, d, dd, c = np.empty((m, Q)), np.zeros((m, Q)), np.zeros((m, m, Q)), np.empty((m - 1, Q))
     ab, mean, pressure, volumetric = np.empty(2 * Q), np.empty(3 * L), np.empty(Q), np.empty(Q)
-    least = 1.0
+    least = np.ones(Q)
     for tile in range(conn.shape[0]):
         geo, gam = geometry[tile].reshape(-1), gamma[tile].reshape(-1)
         w = geo[9 * Q:]
@@ -197,7 +197,7 @@ def force_general_3d(law, constants, k_bulk, conn, x, geometry, gamma, fibres, j
             force3d._gradient(z[8 * i * L:8 * (i + 1) * L], g)
             force3d._push(g, geo, F[3 * i * Q:3 * (i + 1) * Q])
         force3d._invariants(F, J, floored, tr)
-        least = force2d.least_live(J, gam, least)
+        force2d.least_live(J, gam, least)
         guess_inverse_cbrt(floored.view(np.int64), R.view(np.int64))
         refine_inverse_cbrt(floored, R)
         _invariants_3d(F, tr, R, fibres[tile], I)
@@ -217,4 +217,4 @@ def force_general_3d(law, constants, k_bulk, conn, x, geometry, gamma, fibres, j
             force3d._nodal_force(t, out[i * L:])
         force2d._add(psi_q, volumetric, density)
         force3d._energy(w, gam, density, psi[tile])
-    return least
+    return least.min()

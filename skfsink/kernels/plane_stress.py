@@ -112,14 +112,14 @@ def force_plane_stress(law, constants, k_bulk, conn, x, geometry, gamma, j_bar, 
     inv_j, y, p, s, I1 = np.empty(_Q), np.empty(_Q), np.empty(_Q), np.empty(_Q), np.empty(_Q)
     psi_q, dpsi, ddpsi = np.empty(_Q), np.empty(_Q), np.empty(_Q)
     J, j, t = ws[4 * _Q:5 * _Q], ws[9 * _Q:10 * _Q], ws[10 * _Q:11 * _Q]
-    least = 1.0
+    least = np.ones(_Q)
     for b in range(conn.shape[0]):
         geo, g = geometry[b].reshape(-1), gamma[b].reshape(-1)
         w = geo[4 * _Q:]
         _gather(conn[b], x, z)
         _kinematics(z, geo, ws)
         _shift(t)
-        least = least_live(J, g, least)
+        least_live(J, g, least)
         _thin(law, constants, k_bulk, t, j, inv_j, y, p, s, I1, psi_q, dpsi, ddpsi)
         _coefficients(w, g, y, inv_j, s, dpsi, ab)
         _stress(ws, geo, ab, t_stress)
@@ -127,7 +127,7 @@ def force_plane_stress(law, constants, k_bulk, conn, x, geometry, gamma, j_bar, 
         density = W[b].reshape(-1)
         _density(psi_q, y, k_bulk, density)
         _energy(w, g, density, psi[b])
-    return least
+    return least.min()
 
 
 # --- second derivatives ---
