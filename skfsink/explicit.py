@@ -23,13 +23,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse.linalg as sla
 from numba import njit
 
 from .deletion import delete_failed, left_in
 from .density import DensitySolver
-from .direct import symmetric_product
 from .errors import InstabilityError, require
+from .frequency import highest_frequency
 from .loading import Loading
 from .momentum import Momentum
 from .space import Pattern
@@ -63,27 +62,6 @@ class ExplicitControls:
         require("mass-floor", self.mass_floor, low=0, high=1, high_open=True)
         require("estimate-every", self.estimate_every, "steps", low=1, whole=True)
         require("estimate-change", self.estimate_change, low=0, high=1, low_open=True, high_open=True)
-
-
-def highest_frequency(momentum: Momentum, pattern: Pattern, free: np.ndarray, u: np.ndarray, mass: np.ndarray,
-                      start: np.ndarray | None = None, tolerance: float = 1e-3) -> tuple[float, np.ndarray]:
-    """Highest eigenfrequency omega [rad/s] of  K(u) x = omega^2 M x  over the free unknowns, and its vector.
-
-    Lanczos on the mass-scaled tangent of the deformed, damaged body. `start` is a starting vector, best the result of
-    the last call. The estimate approaches from below, by about `tolerance`.
-    """
-    dim = momentum.space.dim
-    data = momentum.tangent(pattern, u)
-    scale = 1.0 / np.sqrt(np.repeat(mass, dim)[free])
-    indptr, indices = pattern.indptr.view(np.uint32), pattern.indices.view(np.uint32)
-    operator = sla.LinearOperator((pattern.size,) * 2, dtype=float, matvec=lambda x: scale * symmetric_product(
-        indptr, indices, data, scale * np.ascontiguousarray(x).ravel()))
-    # The highest mode sits in one element, and the next one may sit in another, where the last result is zero: add
-    # a vector that reaches everywhere, has no symmetry, and is the same every time.
-    everywhere = np.sin(1.0 + np.arange(pattern.size) * 2.399963) * np.sqrt(2.0 / pattern.size)
-    start = everywhere if start is None else everywhere + start
-    value, vector = sla.eigsh(operator, k=1, which="LA", v0=start, tol=tolerance, ncv=min(16, pattern.size - 1))
-    return float(np.sqrt(max(value[0], 0.0))), vector[:, 0]
 
 
 class Explicit:
@@ -137,12 +115,16 @@ class Explicit:
         self.momentum.set_time(state.grip)
         self._grip_velocity, self._knot = self.loading.velocity(state.grip), self.loading.knot(state.grip)
         self.momentum.set_gamma(state.gamma, state.deleted)
-        self.mass = self.momentum.lumped_mass(self._mass_floor)
+        self._set_mass()
         self.reaction = self.momentum.force(state.u)
         self._W = self.momentum.tiles.W
         self._W_max = self.momentum.tiles.tile(state.W_max)
         self._elastic = self.momentum.energy
         self._spare = np.empty_like(self.reaction)
+
+    def _set_mass(self) -> None:
+        self.mass = self.momentum.lumped_mass(self._mass_floor)
+        self._inverse = self._free / self.mass[:, None]  # zero where a degree of freedom is held
 
     def begin(self, state: State) -> None:
         """Set the body in motion: accelerations from the forces, energies of the start."""
@@ -175,7 +157,7 @@ class Explicit:
         du = _move(state.u, state.v, state.a, self._free, self._grip_velocity, dt)
         force = self.momentum.force(state.u, self._spare)
         np.maximum(self._W_max, self._W, out=self._W_max)
-        trapezoid, held, kinetic, swing = _kick(state.v, state.a, self._free, self.mass, old, force, du, dt)
+        trapezoid, held, kinetic, swing = _kick(state.v, state.a, self._inverse, self.mass, old, force, du, dt)
         self.reaction, self._spare = force, old
         ledger = state.ledger
         elastic = self.momentum.energy
@@ -223,7 +205,8 @@ class Explicit:
         left = left_in(momentum, state.gamma, failed) if failed.size else 0.0
         dead, before = momentum.dead, None if momentum.dead is None else momentum.dead.values
         stored = momentum.set_gamma(state.gamma, state.deleted)
-        mass, self.mass = self.mass, momentum.lumped_mass(self._mass_floor)
+        mass = self.mass
+        self._set_mass()
         ledger.sink_stored += stored - left
         ledger.deletion += left
         half_v2 = _half_square(state.v)
@@ -271,7 +254,7 @@ class Explicit:
 
     def _indicator(self, u: np.ndarray) -> float:
         """A lower bound of omega_max^2 that follows it closely; see :meth:`.Momentum.stiffest`."""
-        return self.momentum.stiffest(u, self._free / self.mass[:, None])
+        return self.momentum.stiffest(u, self._inverse)
 
     # --- checkpoints ---
     def memory(self) -> dict[str, np.ndarray]:
@@ -314,19 +297,21 @@ def _move(u, v, a, free, grip_velocity, dt):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _kick(v, a, free, mass, old, force, du, dt):  # type: ignore[no-untyped-def]
+def _kick(v, a, inverse, mass, old, force, du, dt):  # type: ignore[no-untyped-def]
     """Second half of the step; returns trapezoidal work (all, held), kinetic energy, change of f.m^-1 f (free)."""
     work, held, kinetic, swing = 0.0, 0.0, 0.0, 0.0
     for n in range(v.shape[0]):
+        square = 0.0
         for i in range(v.shape[1]):
-            f0 = -mass[n] * a[n, i] if free[n, i] else old[n, i]
-            step_work = 0.5 * (f0 + force[n, i]) * du[n, i]
-            work += step_work
-            if free[n, i]:
-                a[n, i] = -force[n, i] / mass[n]
+            f, one_by_m = force[n, i], inverse[n, i]
+            if one_by_m > 0.0:
+                f0 = -mass[n] * a[n, i]
+                a[n, i] = -f * one_by_m
                 v[n, i] += 0.5 * dt * a[n, i]
-                swing += (force[n, i] ** 2 - f0**2) / mass[n]
+                swing += (f * f - f0 * f0) * one_by_m
+                work += 0.5 * (f0 + f) * du[n, i]
             else:
-                held += step_work
-            kinetic += 0.5 * mass[n] * v[n, i] ** 2
-    return work, held, kinetic, swing
+                held += 0.5 * (old[n, i] + f) * du[n, i]
+            square += v[n, i] * v[n, i]
+        kinetic += 0.5 * mass[n] * square
+    return work + held, held, kinetic, swing
