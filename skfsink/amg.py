@@ -53,7 +53,7 @@ class AmgCG:
 
     def _correct_on(self, P: csr_array, coarse: csr_array) -> None:
         """Take `coarse` as the second level, with the prolongation P, (unknowns it works on, coarse ones)."""
-        self._P, self._coarse_matrix = P, coarse
+        self._P, self._R, self._coarse_matrix = P, csr_array(P.T), coarse
         self._coarse: Callable[[np.ndarray], np.ndarray]
         if coarse.shape[0] == 0:
             self._coarse = np.copy
@@ -120,15 +120,15 @@ class AmgCG:
 
         Only the values at `nodes` are changed. False if it did not converge.
         """
-        matrix, P, nodes = unsigned(A), unsigned(self._P), self.nodes
+        matrix, R, nodes = unsigned(A), unsigned(self._R), self.nodes
         smoother, live = self.omega / D, ~self.dead(D)
         z, t, p, q = (np.zeros_like(r) for _ in range(4))  # zero outside of `nodes`
-        coarse = np.empty(self._P.shape[1])
+        part, coarse = np.empty(nodes.size), np.empty(self._R.shape[0])
         rz_old, self.iterations = 1.0, 0
         _advance(nodes, 0.0, p, q, x, r, smoother, z)
         while self.iterations < self.max_iterations:
-            _restrict(nodes, *matrix, z, r, live, *P, coarse)
-            rz = _correct_and_smooth(nodes, *matrix, z, r, smoother, live, *P, self._coarse(coarse), t)
+            _restrict(nodes, *matrix, z, r, live, *R, part, coarse)
+            rz = _correct_and_smooth(nodes, *matrix, z, r, smoother, live, *R, self._coarse(coarse), t)
             pq = _direction(nodes, *matrix, rz / rz_old, t, p, q)
             if not (np.isfinite(pq) and pq > 0.0):
                 return False
@@ -146,8 +146,9 @@ def residual(A: csr_array, x: np.ndarray, b: np.ndarray) -> np.ndarray:
     return r
 
 
-# In the loops below a row of A is taken with the whole vector, which is zero outside of `nodes`. Row m of the
-# prolongation P (arrays start, column, weight) belongs to nodes[m].
+# In the loops below a row of A is taken with the whole vector, which is zero outside of `nodes`. The restriction R
+# (arrays start, column, weight) has a row for each coarse unknown, whose columns m stand for nodes[m]; its rows are
+# longer than those of the prolongation R^T, and loops over them better to foresee.
 @njit(cache=True)
 def _row(indptr, indices, data, x, i):  # type: ignore[no-untyped-def]
     total = 0.0
@@ -163,26 +164,25 @@ def _residual(indptr, indices, data, x, b, r):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _restrict(nodes, indptr, indices, data, z, r, live, start, column, weight, coarse):  # type: ignore[no-untyped-def]
-    """coarse = P^T (r - A z) of the live nodes."""
-    coarse[:] = 0.0
+def _restrict(nodes, indptr, indices, data, z, r, live, start, column, weight, part, coarse):  # type: ignore[no-untyped-def]
+    """coarse = R (r - A z) of the live nodes; `part` takes that residual."""
     for m in range(nodes.size):
         i = nodes[m]
-        if live[i]:
-            value = r[i] - _row(indptr, indices, data, z, i)
-            for k in range(start[m], start[m + 1]):
-                coarse[column[k]] += weight[k] * value
+        part[m] = r[i] - _row(indptr, indices, data, z, i) if live[i] else 0.0
+    for c in range(coarse.size):
+        coarse[c] = _row(start, column, weight, part, c)
 
 
 @njit(cache=True)
 def _correct_and_smooth(nodes, indptr, indices, data, z, r, smoother, live,  # type: ignore[no-untyped-def]
                         start, column, weight, coarse, t):
-    """z += P coarse at the live nodes, then t = z + smoother (r - A z); returns r.t."""
-    for m in range(nodes.size):
-        i = nodes[m]
-        if live[i]:
-            for k in range(start[m], start[m + 1]):
-                z[i] += weight[k] * coarse[column[k]]
+    """z += R^T coarse at the live nodes, then t = z + smoother (r - A z); returns r.t."""
+    for c in range(coarse.size):
+        value = coarse[c]
+        for k in range(start[c], start[c + 1]):
+            i = nodes[column[k]]
+            if live[i]:
+                z[i] += weight[k] * value
     total = 0.0
     for i in nodes:
         t[i] = z[i] + smoother[i] * (r[i] - _row(indptr, indices, data, z, i))

@@ -105,10 +105,11 @@ class DensitySolver:
         if not np.isfinite(W_max.max()):  # infinite, it would make a dead point in silence
             raise ConvergenceError("the stored energy of a Gauss point is not finite: lower --courant or --hht-dt")
         sink = self._coefficients(W_max)
-        if self.last_sink is not None and not _changed(sink, self.last_sink, self.unchanged):
+        if sink is None:
             self.skipped += 1
             return gamma
         self.solves += 1
+        self.last_sink = None  # until this one has succeeded
         data = self._assemble(sink)
         result = None
         if self.sink != "consistent" or sink.max() < 1e3 * sink.min():
@@ -119,19 +120,25 @@ class DensitySolver:
             raise ConvergenceError(f"the relative density left (0, 1]: {result.min():.3g} to {result.max():.6g}; the "
                                    f"mesh has elements so flat that the lumped sink loses its maximum principle")
         self.last_sink = sink
-        np.copyto(self._last_W, W_max)
         return result
 
-    def _coefficients(self, W_max: np.ndarray) -> np.ndarray:
-        """Sink coefficients 1/(H + eps), (ne, nq), computed anew where the history is not that of the last solve."""
+    def _coefficients(self, W_max: np.ndarray) -> np.ndarray | None:
+        """Sink coefficients 1/(H + eps), (ne, nq), anew where the history has moved; None if none is another."""
         if self.last_sink is None:
+            np.copyto(self._last_W, W_max)
             return 1.0 / (self._history(W_max) + self.law.epsilon)
-        sink, moved = self.last_sink.copy(), np.empty(len(W_max), bool)
-        _moved(W_max, self._last_W, moved)
+        moved = _moved(W_max, self._last_W)
+        news = []
         for elements, law in self._parts:
-            mine = elements[moved[elements]]
-            sink[mine] = 1.0 / (law.history(W_max[mine]) + self.law.epsilon)
-        return sink
+            mine = elements[moved[elements]] if len(self._parts) > 1 else np.flatnonzero(moved)
+            new = 1.0 / (law.history(W_max[mine]) + self.law.epsilon)
+            news.append((mine, new))
+        if not any(_changed(new, self.last_sink[mine], self.unchanged) for mine, new in news):
+            return None
+        for mine, new in news:
+            self.last_sink[mine] = new
+            self._last_W[mine] = W_max[mine]
+        return self.last_sink
 
     def _history(self, W_max: np.ndarray) -> np.ndarray:
         """H of Eq. (10), (ne, nq), each element by its law."""
@@ -209,9 +216,11 @@ def _changed(new, old, tolerance):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _moved(new, old, moved):  # type: ignore[no-untyped-def]
+def _moved(new, old):  # type: ignore[no-untyped-def]
+    """Mask of the rows that are not the same."""
+    moved = np.zeros(new.shape[0], np.bool_)
     for e in range(new.shape[0]):
-        moved[e] = False
         for q in range(new.shape[1]):
             if new[e, q] != old[e, q]:
                 moved[e] = True
+    return moved
