@@ -290,5 +290,6 @@ def test_documented_figures_are_those_of_the_file(tmp_path: Path):
         points = {k.removeprefix(start): p for k, p in stored["points"].items() if k.startswith(start)}
         assert points and not [line for line in part.table(points) if line not in text]
         assert {p.key for p in part.plan(False)} == points.keys()
-        part.draw(points, tmp_path / f"{name}.png")
-        assert (tmp_path / f"{name}.png").stat().st_size > 1e5
+        if name == "space":  # the others take long
+            part.draw(points, tmp_path / f"{name}.png")
+            assert (tmp_path / f"{name}.png").stat().st_size > 1e5
