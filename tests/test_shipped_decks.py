@@ -16,7 +16,7 @@ from plates import invoke_program, plate
 
 import skfsink.run
 from skfsink import shipped
-from skfsink.deck import read_deck
+from skfsink.deck import CASES, parameters_of, read_deck
 from skfsink.errors import ParameterError
 from skfsink.material import SinkLaw
 from skfsink.meshing import write_mesh
@@ -56,10 +56,22 @@ def one_by_one(folders: Sequence[Path], jobs: int) -> Iterator[Path]:
 
 
 # --- by name ---
+@pytest.mark.parametrize("case", [case for case in CASES if case != "custom"])
+def test_the_deck_of_a_case_has_its_defaults(case: str) -> None:
+    """Fails if the deck of a scene of the paper is not that scene, computed both ways, or says another default."""
+    deck, known = read_deck(shipped_decks()[case]), parameters_of(case)
+    assert deck.case == case and deck.parameters["analysis"] == "both"
+    for name, value in deck.parameters.items():
+        assert value == (0.1686 if name == "phi" else "both" if name == "analysis" else known[name]), name
+    page = (data_folder(case) / "README.md").read_text(encoding="utf-8")
+    assert f"skfsink run {case} " in page and "**Expected**" in page and "**Came out**" in page
+
+
 def test_each_deck_can_be_run() -> None:
     """Fails if a deck is not found, cannot be read, or names a mesh, a boundary or a parameter that do not exist."""
-    assert set(shipped_decks()) == set(DECKS)
-    for name, path in shipped_decks().items():
+    assert set(shipped_decks()) == {*DECKS, *CASES} - {"custom"}
+    for name in DECKS:
+        path = shipped_decks()[name]
         deck = read_deck(path)
         own, _ = deck.check()
         sample = file_sample(Path(own["mesh"]))
@@ -97,7 +109,7 @@ def test_a_name_stands_for_a_deck(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     assert deck_path(Path("pure_shear")) == path
     (tmp_path / "centre_crack").write_text("")
     assert deck_path(Path("centre_crack")) == Path("centre_crack")
-    with pytest.raises(ParameterError, match="one of biaxial_hole, centre_crack, pure_shear; got 'hole'"):
+    with pytest.raises(ParameterError, match="one of asymmetric_.*, biaxial_hole, .*; got 'hole'"):
         deck_path(Path("hole"))
 
 
@@ -109,7 +121,7 @@ def test_commands_take_names(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     assert status == 0 and all(name in out for name in DECKS)
     for command in (("run", "nothing"), ("sweep", "nothing", "--vary", "m=10")):
         status, err, _ = invoke_program(*command)
-        assert status == 2 and err.count("\n") == 1 and "or one of biaxial_hole" in err
+        assert status == 2 and err.count("\n") == 1 and "or one of asymmetric_double_edge_notch, biaxial_hole" in err
     deck = tmp_path / "small" / "scene.toml"
     deck.parent.mkdir()
     write_mesh(deck.parent / "plate.vtu", plate(9))

@@ -28,6 +28,8 @@ def list_cases() -> None:
     decks.add_column("what it is")
     decks.add_column("meshes")
     for name, path in shipped_decks().items():
+        if name in CASES:  # the deck of a case
+            continue
         meshes = sorted(mesh.stem for mesh in (path.parent / "meshes").glob("*.vtu"))
         decks.add_row(name, description(path), ", ".join(meshes))
     console = Console()
