@@ -120,7 +120,7 @@ class Explicit:
         self._W = self.momentum.tiles.W
         self._W_max = self.momentum.tiles.tile(state.W_max)
         self._elastic = self.momentum.energy
-        self._spare = np.empty_like(self.reaction)
+        self._spare, self._du = np.empty_like(self.reaction), np.empty_like(self.reaction)
 
     def _set_mass(self) -> None:
         self.mass = self.momentum.lumped_mass(self._mass_floor)
@@ -154,7 +154,8 @@ class Explicit:
             dt, grip = self._knot - state.grip, self._knot
         old, before = self.reaction, None if dead is None else dead.values
         self.momentum.set_time(grip)
-        du = _move(state.u, state.v, state.a, self._free, self._grip_velocity, dt)
+        du = self._du
+        _move(state.u, state.v, state.a, self._free, self._grip_velocity, dt, du)
         force = self.momentum.force(state.u, self._spare)
         np.maximum(self._W_max, self._W, out=self._W_max)
         trapezoid, held, kinetic, swing = _kick(state.v, state.a, self._inverse, self.mass, old, force, du, dt)
@@ -282,9 +283,8 @@ def _half_square(v: np.ndarray) -> np.ndarray:
 
 
 @njit(cache=True)
-def _move(u, v, a, free, grip_velocity, dt):  # type: ignore[no-untyped-def]
-    """Advance v by half a step and u by a step; returns the displacement increment."""
-    du = np.empty_like(u)
+def _move(u, v, a, free, grip_velocity, dt, du):  # type: ignore[no-untyped-def]
+    """Advance v by half a step and u by a step, of which `du` takes the increment."""
     for n in range(u.shape[0]):
         for i in range(u.shape[1]):
             if free[n, i]:
@@ -293,7 +293,6 @@ def _move(u, v, a, free, grip_velocity, dt):  # type: ignore[no-untyped-def]
             else:
                 du[n, i] = dt * grip_velocity[n, i]
             u[n, i] += du[n, i]
-    return du
 
 
 @njit(cache=True)
