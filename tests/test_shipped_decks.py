@@ -109,7 +109,7 @@ def test_a_name_stands_for_a_deck(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     assert deck_path(Path("pure_shear")) == path
     (tmp_path / "centre_crack").write_text("")
     assert deck_path(Path("centre_crack")) == Path("centre_crack")
-    with pytest.raises(ParameterError, match="one of asymmetric_.*, biaxial_hole, .*; got 'hole'"):
+    with pytest.raises(ParameterError, match=r"one of asymmetric_.*, biaxial_hole, .*; got 'hole'"):
         deck_path(Path("hole"))
 
 
