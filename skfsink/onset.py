@@ -1,0 +1,255 @@
+"""Static loading to the onset of failure, and what it shares with quasi-static propagation.
+
+Grips and dead loads follow the load time, the clock of the loading. Up to a sharp limit the loaded body is elastic
+and gamma hardly moves; beyond it no static solution exists. Loading looks for that limit, the *onset*, by bisection on
+the load.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from .density import DensitySolver
+from .errors import ConvergenceError, require
+from .loading import Loading
+from .momentum import Momentum
+from .newton import Newton
+from .state import State
+
+__all__ = ["StaticLoading", "StaticsControls"]
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class StaticsControls:
+    """Options of the static analyses.
+
+    Parameters
+    ----------
+    tolerance: residual force at which equilibrium is reached, relative to the forces inside, in (0, 0.01].
+    gamma_tolerance: change of gamma in a pass at which the coupled fields are converged, in (0, 0.01].
+    front: a sweep fails the points whose stored energy is at least this share of the greatest one, in [0, 1]; 0 fails
+        all that are past the energy limiter at once.
+    increment: first (and largest) load increment, as displacement of a grip over the size of the body, or as change of
+        a traction over twice the shear modulus, in (0, 0.5].
+    onset_tolerance: width of the last bisection interval of the onset, relative to the load, in (0, 0.1].
+    max_newton: Newton steps after which an equilibrium is given up, >= 3.
+    max_passes: passes over the two fields after which a load increment is given up, >= 3.
+    """
+
+    tolerance: float = 1e-7
+    gamma_tolerance: float = 1e-5
+    increment: float = 0.01
+    front: float = 0.8
+    onset_tolerance: float = 5e-4
+    max_newton: int = 40
+    max_passes: int = 80
+
+    def __post_init__(self) -> None:
+        require("static-tolerance", self.tolerance, low=0, high=0.01, low_open=True)
+        require("gamma-tolerance", self.gamma_tolerance, low=0, high=0.01, low_open=True)
+        require("front", self.front, low=0, high=1)
+        require("increment", self.increment, low=0, high=0.5, low_open=True)
+        require("onset-tolerance", self.onset_tolerance, low=0, high=0.1, low_open=True)
+        require("max-newton", self.max_newton, low=3, whole=True)
+        require("max-passes", self.max_passes, low=3, whole=True)
+
+
+class StaticLoading:
+    """Equilibria of a body between grips.
+
+    Parameters
+    ----------
+    momentum, density: the two fields.
+    free: (n*dim,) mask of the degrees of freedom that no grip holds.
+    motion: of the held ones, as a :class:`.Loading`, or as their velocity (n, dim) [mm/s]; then they are displaced by
+        velocity times t at load time t.
+    deletion: gamma at which an element fails.
+    """
+
+    STALLED = 0.9  # factor of the changes of gamma a pass from which on the load is within 0.1 % of the onset
+    LEAST = 1e-6  # part of the first increment at which a body without load is given up
+
+    def __init__(self, momentum: Momentum, density: DensitySolver, free: np.ndarray, motion: np.ndarray | Loading,
+                 controls: StaticsControls | None = None, deletion: float = 1e-6, threads: int = 1) -> None:
+        self.momentum, self.density, self.deletion = momentum, density, deletion
+        self.controls = controls or StaticsControls()
+        self.space = momentum.space
+        self.free = free
+        self.loading = Loading.of(self.space, free, motion)
+        self._size = float(np.ptp(self.space.X, axis=0).max())
+        self.newton = Newton(momentum, free, self.controls.tolerance, self.controls.max_newton, threads)
+        self.increment = 0.0      #: current load increment, as load time [s]; 0 before the first
+        self.refused = ""         #: why the last increment was given up: "no equilibrium", "runs away" or "passes"
+        self.factor = 0.0         #: ratio of the last two changes of gamma in the iteration of the two fields
+
+    def equilibrium(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Displacement in equilibrium at the current gamma, from the guess `u`; see :meth:`.Newton.equilibrium`."""
+        return self.newton.equilibrium(u)
+
+    @property
+    def newton_steps(self) -> int:
+        """Newton steps made so far."""
+        return self.newton.steps
+
+    @property
+    def factorisations(self) -> int:
+        """Numerical factorisations made so far."""
+        return self.newton.solver.count
+
+    def _predict(self, u: np.ndarray, increment: float, t: float = 0.0) -> np.ndarray:
+        """`u` after moving the grips from load time `t` on for a time `increment`, to first order in it.
+
+        The dead loads are those last given to the momentum balance.
+        """
+        return self.newton.predict(u, self.loading.velocity(t) * increment)
+
+    # --- load time ---
+    def _longest(self, t: float) -> float:
+        """The largest increment of the load time from `t` on, infinity if nothing moves up to the next knot [s]."""
+        speed, pull, increment = self.loading.speed(t), self.loading.pull(t), self.controls.increment
+        by_grips = increment * self._size / speed if speed > 0.0 else np.inf
+        return min(by_grips, increment * 2.0 * self.momentum.material.shear_modulus / pull if pull > 0.0 else np.inf)
+
+    def _path(self, t: float) -> float:
+        """Length of the way to load time `t`, in the largest increments; the measure of the load."""
+        total, start = 0.0, 0.0
+        while start < t:
+            end = min(self.loading.knot(start), t)
+            total += (end - start) / self._longest(start)
+            start = end
+        return total
+
+    def _age(self, t: float) -> float:
+        """Time the way to load time `t` would have taken at the rates from `t` on: `t` itself without ramps [s]."""
+        return self._path(t) * self._longest(t) if self.loading.knots else t
+
+    def past(self, t: float, share: float) -> float:
+        """The load time at which the load has grown by `share` since load time `t` [s]."""
+        return t + share * self._age(t) if self.loading.knots else t * (1.0 + share)
+
+    def _end(self, t: float, increment: float) -> float:
+        """Load time after an increment from `t` on: no later than the next knot, which is hit exactly [s]."""
+        knot = self.loading.knot(t)
+        return knot if knot - t <= 1.001 * increment else t + increment
+
+    # --- both fields ---
+    def _settle(self, state: State, u: np.ndarray) -> tuple[np.ndarray, ...] | None:
+        """Iterate the two fields from the guess `u`; (u, force, gamma, W_max, W), or None if they run away."""
+        c = self.controls
+        gamma, W_max = state.gamma, state.W_max
+        last, growing, self.refused = np.inf, 0, "no equilibrium"
+        for _ in range(c.max_passes):
+            try:
+                u, force = self.newton.equilibrium(u, max(c.tolerance, min(1e-5, 1e-3 * last)))
+            except ConvergenceError:
+                return None
+            W = self.momentum.W
+            W_max = np.maximum(state.W_max, W)
+            new = self.density.solve(W_max, gamma)
+            change = float(np.abs(new - gamma).max())
+            gamma = new
+            self.momentum.set_gamma(gamma, state.deleted)
+            if change <= c.gamma_tolerance:
+                return u, force, gamma, W_max, W
+            growing, self.factor = growing + 1 if change > 0.98 * last else 0, change / last
+            if growing >= 3 or gamma.min() < 0.2:
+                self.refused = "runs away"
+                return None
+            last = change
+        self.refused = "passes"
+        return None
+
+    def load(self, state: State) -> Iterator[State]:
+        """Load `state` to the onset, yielding it after each accepted increment; the last one is the onset.
+
+        An increment ends at the next knot of the loading at the latest; a stretch in which nothing moves is passed
+        over. The ledger's work is trapezoidal, so its balance shows the error of the increments.
+
+        Raises
+        ------
+        ConvergenceError
+            There is no equilibrium under the smallest increment, or nothing moves any more and there was no onset.
+        """
+        c, dead = self.controls, self.momentum.dead
+        ledger = state.ledger
+        held = ~self.free.reshape(state.u.shape)
+        self.momentum.set_time(state.grip)
+        self.momentum.set_gamma(state.gamma, state.deleted)
+        force = self.momentum.force(state.u)
+        W = self.momentum.W
+        while True:
+            longest = self._longest(state.grip)
+            if longest == np.inf:
+                self._pass_over(state, float((W / self.density.phi)[self.momentum.gamma > 0].max(initial=0.0)))
+                continue
+            self.increment = self.increment or longest
+            end = self._end(state.grip, self.increment)
+            increment = self.increment if end == state.grip + self.increment else end - state.grip
+            before = None if dead is None else dead.values
+            self.momentum.set_time(end)
+            self.momentum.set_gamma(state.gamma, state.deleted)
+            try:
+                settled = self._settle(state, self._predict(state.u, increment, state.grip))
+            except ConvergenceError:
+                settled, self.refused = None, "no equilibrium"
+            if settled is None:
+                self.increment = 0.5 * increment
+                self.momentum.set_time(state.grip)
+                if state.step == 0 and self.increment < self.LEAST * longest:
+                    raise ConvergenceError("the body finds no equilibrium under the smallest load increment")
+                if state.step and self.increment <= c.onset_tolerance * (self._age(state.grip) + self.increment):
+                    self._doubt()
+                    self.momentum.set_gamma(state.gamma, state.deleted)
+                    self.momentum.force(state.u)
+                    return
+                continue
+            u, new_force, gamma, W_max, W_new = settled
+            ledger.work += 0.5 * float(np.sum((force + new_force)[held] * (u - state.u)[held]))
+            if dead is not None and before is not None:
+                ledger.work += dead.changed(before, 0.5 * (state.u + u))
+            intact = self.momentum.effective(state.gamma, state.deleted)
+            ledger.drop(self.space.w, 0.5 * (W + W_new), intact, self.momentum.gamma)
+            state.u, state.gamma, state.W_max = u, gamma, W_max
+            force, W = self.momentum.force(state.u), W_new  # at the settled gamma, as after a resume
+            if end == self.loading.knot(state.grip):
+                self.increment = 0.0  # the next one is by the rates that follow
+            state.grip = state.time = end
+            state.step += 1
+            ledger.elastic, ledger.loads = self.momentum.energy, self.momentum.loads
+            yield state
+
+    def _doubt(self) -> None:
+        """Say so where the onset is not where the sink runs away."""
+        if self.refused == "passes" and self.factor < self.STALLED:
+            log.warning("the onset may be too low: the last load increment was given up after %d passes over the two "
+                        "fields while the change of gamma still fell (by a factor of %.3f a pass); raise max_passes",
+                        self.controls.max_passes, self.factor)
+        elif self.refused == "no equilibrium":
+            log.warning("the onset is where Newton's method ends, not where the sink runs away: the body may buckle or "
+                        "be torn by its grips; refine the mesh, or check grips and constants")
+
+    def _pass_over(self, state: State, reached: float) -> None:
+        """Go on to the next knot, where nothing moves before it; `reached` is the greatest W/Phi."""
+        knot = self.loading.knot(state.grip)
+        if knot == np.inf:
+            raise ConvergenceError(f"nothing moves after load time {state.grip:.4g} s, and nothing has failed: the "
+                                   f"greatest W/Phi is {reached:.3g}, where points fail near 1; let a ramp go further, "
+                                   f"or give a grip or traction a rate")
+        state.grip = state.time = knot
+        self.momentum.set_time(knot)
+
+    # --- checkpoints ---
+    def memory(self) -> dict[str, np.ndarray]:
+        """What loading remembers beyond the state."""
+        return {"increment": np.array(self.increment), **self.newton.memory()}
+
+    def restore(self, memory: dict[str, np.ndarray]) -> None:
+        """Take up what :meth:`memory` gave."""
+        self.increment = float(memory["increment"])
+        self.newton.restore(memory)
