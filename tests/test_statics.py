@@ -105,7 +105,7 @@ def test_strength_of_a_block_is_the_closed_form(kind: str, peak: float):
         force = momentum.force(state.u)
         stresses.append(float(force[high, 1].sum()) * s)
         if H > 0.9:
-            assert np.ptp(state.gamma) < 1e-6
+            assert np.ptp(state.gamma) < 5e-6  # the fields are iterated to 1e-5
             assert state.gamma[0] == pytest.approx(H, abs=1e-4)
             assert stresses[-1] == pytest.approx(cauchy[1, 1] - cauchy[0, 0], rel=3e-4)
     assert max(stresses) == pytest.approx(peak, rel=3e-3)  # between increments of one per cent
