@@ -12,7 +12,8 @@ from .pattern import Pattern
 
 __all__ = ["highest_frequency"]
 
-MOST = 300  # Lanczos steps
+STEPS = 60      # of Lanczos's method, whose vectors are kept
+RESTARTS = 20   # from what they have found
 
 
 def highest_frequency(momentum: Momentum, pattern: Pattern, free: np.ndarray, u: np.ndarray, mass: np.ndarray,
@@ -20,7 +21,7 @@ def highest_frequency(momentum: Momentum, pattern: Pattern, free: np.ndarray, u:
     """Highest eigenfrequency omega [rad/s] of  K(u) x = omega^2 M x  over the free unknowns, and its vector.
 
     Lanczos on the mass-scaled tangent of the deformed, damaged body. `start` is a starting vector, best the result of
-    the last call. The estimate approaches from below, by less than `tolerance`.
+    the last call. The estimate approaches from below, by about `tolerance`.
     """
     indptr, indices = pattern.indptr.view(np.uint32), pattern.indices.view(np.uint32)
     data = momentum.tangent(pattern, u)
@@ -40,25 +41,30 @@ def _lanczos(indptr: np.ndarray, indices: np.ndarray, data: np.ndarray, start: n
     Its residual |A x - value x| is at most `tolerance` of it. The vectors lose their orthogonality, which gives an
     eigenvalue that has been found a second time, but none that is wrong.
     """
-    vectors: list[np.ndarray] = [start]
-    diagonal: list[float] = []
-    beside: list[float] = []
-    previous, beta = np.zeros_like(start), 0.0
-    while True:
-        following = np.empty_like(start)
-        alpha, beta = _step(indptr, indices, data, vectors[-1], previous, beta, following)
-        diagonal.append(alpha)
-        last = len(diagonal) - 1
-        values, modes = la.eigh_tridiagonal(diagonal, beside, select="i", select_range=(last, last))
-        residual = beta * abs(modes[-1, 0]) / max(abs(values[0]), 1e-300)
+    residual = np.inf
+    for _ in range(RESTARTS):
+        vectors: list[np.ndarray] = [start]
+        diagonal: list[float] = []
+        beside: list[float] = []
+        previous, beta = np.zeros_like(start), 0.0
+        while True:
+            following = np.empty_like(start)
+            alpha, beta = _step(indptr, indices, data, vectors[-1], previous, beta, following)
+            diagonal.append(alpha)
+            last = len(diagonal) - 1
+            values, modes = la.eigh_tridiagonal(diagonal, beside, select="i", select_range=(last, last))
+            residual = beta * abs(modes[-1, 0]) / max(abs(values[0]), 1e-300)
+            if not residual > tolerance or len(vectors) == STEPS:
+                break
+            previous = vectors[-1]
+            vectors.append(following)
+            beside.append(beta)
+        start = modes[:, 0] @ np.array(vectors)
+        start /= np.linalg.norm(start)
         if not residual > tolerance:
-            return float(values[0]), modes[:, 0] @ np.array(vectors)
-        if len(vectors) == MOST:
-            raise ConvergenceError(f"no highest frequency was found in {MOST} steps of Lanczos's method: its residual "
-                                   f"is still {residual:.2g} of it")
-        previous = vectors[-1]
-        vectors.append(following)
-        beside.append(beta)
+            return float(values[0]), start
+    raise ConvergenceError(f"no highest frequency was found in {RESTARTS * STEPS} steps of Lanczos's method: its "
+                           f"residual is still {residual:.2g} of it")
 
 
 @njit(cache=True)
