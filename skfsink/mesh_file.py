@@ -120,6 +120,9 @@ def check_mesh(name: str, mesh: meshio.Mesh) -> None:
         for block, index in zip(blocks, members):
             if index is not None and len(index) and not 0 <= np.min(index) <= np.max(index) < len(block.data):
                 raise MeshError(f"mesh {name}: the boundary {one_line(boundary)!r} has cells that do not exist")
+    for boundary, nodes in mesh.point_sets.items():
+        if len(nodes) and not 0 <= nodes.min() <= nodes.max() < len(points):
+            raise MeshError(f"mesh {name}: the boundary {one_line(boundary)!r} has nodes that do not exist")
 
 
 def _sound(mesh: meshio.Mesh) -> meshio.Mesh:
@@ -132,6 +135,7 @@ def _sound(mesh: meshio.Mesh) -> meshio.Mesh:
     for name, (tag, dim) in mesh.field_data.items() if physical else ():  # older formats of gmsh make no sets of these
         mesh.cell_sets.setdefault(name, [np.flatnonzero(np.equal(tags, tag) & (block.dim == dim))
                                          for tags, block in zip(physical, mesh.cells)])
+    mesh.point_sets = {name: np.asarray(nodes, np.int64).ravel() for name, nodes in mesh.point_sets.items()}
     for members in mesh.cell_sets.values():
         members[:] = [None if index is None else np.asarray(index, np.int64).ravel() for index in members]
     return mesh

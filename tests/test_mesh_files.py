@@ -23,7 +23,7 @@ from plates import plate
 from skfsink.errors import MeshError, SkfsinkError
 from skfsink.mesh_file import read_mesh_file
 from skfsink.meshing import write_mesh
-from skfsink.sample import Sample, load_sample
+from skfsink.sample import Sample, file_sample, load_sample
 
 FORMATS = ("vtu", "vtu-text", "msh2", "msh2-binary", "msh4", "msh4-binary", "inp")
 SECONDS = 10.0  # that a file may take
@@ -59,7 +59,8 @@ def write(path: Path, form: str, mesh: meshio.Mesh) -> None:
         write_mesh(path, mesh)
         meshio.write(path, meshio.read(path), "vtu", binary=False)
     elif form == "inp":
-        meshio.write(path, mesh, "abaqus")
+        meshio.write(path, meshio.Mesh(mesh.points, mesh.cells, cell_sets=mesh.cell_sets,
+                                       point_sets={"corner": np.array([0, 3])}), "abaqus")
     elif form == "msh4":
         path.write_text(gmsh_4(mesh))
     elif form == "msh4-binary":  # without boundaries
@@ -108,9 +109,10 @@ def outcome(path: Path) -> Sample | str:
     before = sorted(path.parent.iterdir())
     try:
         with alarmed():
-            sample = load_sample("single_edge_notch", str(path))
-            if "top" in sample.boundaries:
-                sample.nodes("top")
+            sample = file_sample(path)
+            for name in sample.cells:
+                sample.elements(name)
+            sample.nodes("top")
             sample.rim("top"), sample.space.graph, sample.space.V
         result: Sample | str = sample
     except SkfsinkError as error:
@@ -129,7 +131,7 @@ def test_whole_files(form: str, tmp_path: Path) -> None:
     assert isinstance(sample, Sample), sample
     assert sample.space.n_elements == len(plate(5).cells[0].data)
     if form != "msh4-binary":
-        assert {name: len(nodes) for name, nodes in sample.boundaries.items() if name != "body"} == {
+        assert {name: len(nodes) for name, nodes in sample.boundaries.items() if name not in ("body", "corner")} == {
             name: len(np.unique(plate(5).cells[1].data[members[1]])) for name, members in plate(5).cell_sets.items()}
 
 
@@ -373,6 +375,17 @@ def test_bodies_that_cannot_be(change: Callable[[meshio.Mesh], None], part: str,
     write_mesh(tmp_path / "bad.vtu", _quads(change)())
     line = outcome(tmp_path / "bad.vtu")
     assert isinstance(line, str) and part in line and "bad.vtu" in line, line
+
+
+def test_sets_of_nodes_that_do_not_exist(tmp_path: Path) -> None:
+    """Fails if a set of nodes is taken for a boundary that reaches beyond the mesh."""
+    path = tmp_path / "plate.inp"
+    path.write_bytes(template("inp"))
+    assert len(file_sample(path).nodes("corner")) == 2
+    for nodes in ("1, 999", "-1", "0", "1.5", "x"):
+        path.write_bytes(template("inp") + f"\n*NSET, NSET=far\n{nodes}\n".encode())
+        found = outcome(path)
+        assert "plate.inp" in found if isinstance(found, str) else "far" not in found.boundaries, (nodes, found)
 
 
 def test_boundaries_with_odd_names(tmp_path: Path) -> None:
