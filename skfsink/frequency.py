@@ -6,7 +6,7 @@ import numpy as np
 import scipy.linalg as la
 from numba import njit
 
-from .errors import ConvergenceError
+from .errors import ConvergenceError, InstabilityError
 from .momentum import Momentum
 from .pattern import Pattern
 
@@ -50,6 +50,9 @@ def _lanczos(indptr: np.ndarray, indices: np.ndarray, data: np.ndarray, start: n
         while True:
             following = np.empty_like(start)
             alpha, beta = _step(indptr, indices, data, vectors[-1], previous, beta, following)
+            if not np.isfinite(alpha + beta):
+                raise InstabilityError("the tangent of the body is not finite: the explicit integration has blown up; "
+                                       "lower --courant")
             diagonal.append(alpha)
             last = len(diagonal) - 1
             values, modes = la.eigh_tridiagonal(diagonal, beside, select="i", select_range=(last, last))

@@ -8,7 +8,7 @@ import scipy.linalg as la
 from bodies import boundary, box
 
 from skfsink import frequency
-from skfsink.errors import ConvergenceError
+from skfsink.errors import ConvergenceError, InstabilityError
 from skfsink.material import AAA
 from skfsink.momentum import Momentum
 from skfsink.pattern import Pattern
@@ -42,3 +42,13 @@ def test_an_estimate_that_is_not_good_enough_is_refused(monkeypatch: pytest.Monk
     monkeypatch.setattr(frequency, "RESTARTS", 2)
     with pytest.raises(ConvergenceError, match=r"no highest frequency was found in 8 steps .* its residual is still 0"):
         estimate(1e-6)
+
+
+def test_a_body_that_has_blown_up_is_said_to_have() -> None:
+    """Fails if a tangent that is no number is a traceback, or has a frequency."""
+    space = box("quad", 4, 0.2)
+    momentum, free = Momentum(space, AAA()), np.repeat(~boundary(space), 2)
+    u = np.zeros_like(space.X)
+    u[12, 0] = np.nan
+    with pytest.raises(InstabilityError, match="the tangent of the body is not finite: .* lower --courant"):
+        frequency.highest_frequency(momentum, Pattern(space, 2, free, upper=True), free, u, momentum.lumped_mass(0.0))
