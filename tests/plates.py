@@ -77,6 +77,7 @@ def forked(arguments: Sequence[object], stop: int = 0, number: signal.Signals = 
     read, write = os.pipe()
     if (child := os.fork()) == 0:
         status, text, done = 99, "", 0
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell may have had it ignored
 
         def counted(operation: Any) -> Any:
             def wrapper(*args: Any, **kwargs: Any) -> Any:
