@@ -202,7 +202,7 @@ def test_a_worker_that_is_killed_loses_nothing_and_repeats_nothing(
         deck: Path, tmp_path: Path, scheduler: tuple[str, list[psutil.Process]]) -> None:
     """Fails if a run is lost with the worker that was given it, or is made a second time."""
     out, (address, nurses) = tmp_path / "sweep", scheduler
-    deck.write_text(deck.read_text().replace("2 µs", "40 µs"))
+    deck.write_text(deck.read_text().replace("2 µs", "120 µs"))
     sweep = subprocess.Popen([sys.executable, "-m", "skfsink", "sweep", str(deck), "--vary", "phi=0.14..0.17:4",
                               "--out", str(out), "--scheduler", address, "--quiet"])
     killed, deadline = 0, time.monotonic() + 400
