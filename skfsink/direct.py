@@ -21,7 +21,7 @@ from .pattern import Pattern
 
 os.environ.setdefault("MKL_CBWR", "AUTO,STRICT")  # the same bits from one run to the next, whatever the alignment
 
-__all__ = ["Factorization", "one_thread_of_openblas", "symmetric_product", "unsigned"]
+__all__ = ["Factorization", "add_symmetric_product", "one_thread_of_openblas", "symmetric_product", "unsigned"]
 
 try:
     import pypardiso
@@ -204,9 +204,8 @@ class _Pardiso:
 
 
 @njit(cache=True)
-def symmetric_product(indptr, indices, data, x):  # type: ignore[no-untyped-def]
-    """y = A x for the upper triangle of A."""
-    y = np.zeros(x.size)
+def add_symmetric_product(indptr, indices, data, x, y):  # type: ignore[no-untyped-def]
+    """y += A x for the upper triangle of A."""
     for i in range(x.size):
         total, xi = 0.0, x[i]
         for k in range(indptr[i], indptr[i + 1]):
@@ -215,6 +214,13 @@ def symmetric_product(indptr, indices, data, x):  # type: ignore[no-untyped-def]
             if j != i:
                 y[j] += data[k] * xi
         y[i] += total
+
+
+@njit(cache=True)
+def symmetric_product(indptr, indices, data, x):  # type: ignore[no-untyped-def]
+    """y = A x for the upper triangle of A."""
+    y = np.zeros(x.size)
+    add_symmetric_product(indptr, indices, data, x, y)
     return y
 
 

@@ -34,7 +34,7 @@ from .momentum import Momentum
 from .space import Pattern
 from .state import State
 
-__all__ = ["Explicit", "ExplicitControls", "highest_frequency"]
+__all__ = ["Explicit", "ExplicitControls"]
 
 
 @dataclass(frozen=True)

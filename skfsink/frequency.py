@@ -6,6 +6,7 @@ import numpy as np
 import scipy.linalg as la
 from numba import njit
 
+from .direct import add_symmetric_product
 from .errors import ConvergenceError, InstabilityError
 from .momentum import Momentum
 from .pattern import Pattern
@@ -82,14 +83,7 @@ def _step(indptr, indices, data, v, previous, beta, following):  # type: ignore[
     """following = (A v - alpha v - beta previous)/|..| for the upper triangle of A; returns alpha and that norm."""
     for i in range(v.size):
         following[i] = -beta * previous[i]
-    for i in range(v.size):
-        total, vi = 0.0, v[i]
-        for k in range(indptr[i], indptr[i + 1]):
-            j = indices[k]
-            total += data[k] * v[j]
-            if j != i:
-                following[j] += data[k] * vi
-        following[i] += total
+    add_symmetric_product(indptr, indices, data, v, following)
     alpha = 0.0
     for i in range(v.size):
         alpha += following[i] * v[i]

@@ -52,10 +52,7 @@ class Sample:
         MeshError
             The mesh has no such boundary.
         """
-        if boundary not in self.boundaries:
-            raise MeshError(f"mesh {self.name} has no boundary {boundary!r}; it has "
-                            f"{one_line(', '.join(sorted(self.boundaries))) or 'none'}")
-        return self.boundaries[boundary]
+        return self._of(self.boundaries, "boundary", boundary)
 
     def elements(self, name: str) -> np.ndarray:
         """Elements of a named set.
@@ -65,10 +62,13 @@ class Sample:
         MeshError
             The mesh has no such set.
         """
-        if name not in self.cells:
-            raise MeshError(f"mesh {self.name} has no set of elements {name!r}; it has "
-                            f"{one_line(', '.join(sorted(self.cells))) or 'none'}")
-        return self.cells[name]
+        return self._of(self.cells, "set of elements", name)
+
+    def _of(self, sets: Mapping[str, np.ndarray], kind: str, name: str) -> np.ndarray:
+        if name not in sets:
+            raise MeshError(f"mesh {self.name} has no {kind} {name!r}; it has "
+                            f"{one_line(', '.join(sorted(sets))) or 'none'}")
+        return sets[name]
 
     def rim(self, *faces: str) -> np.ndarray:
         """Nodes of the outer boundary without the named `faces`, but with the edges of these."""

@@ -18,8 +18,9 @@ from skfsink.cases.dog_bone import dog_bone
 from skfsink.density import DensitySolver
 from skfsink.energy import Ledger
 from skfsink.errors import ParameterError
-from skfsink.explicit import Explicit, highest_frequency
+from skfsink.explicit import Explicit
 from skfsink.forms import plane_stress_forms
+from skfsink.frequency import highest_frequency
 from skfsink.kernels import plane_stress
 from skfsink.material import AAA, Material, NeoHookean, SinkLaw
 from skfsink.momentum import Momentum

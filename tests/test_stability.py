@@ -9,7 +9,8 @@ from bodies import boundary, box, ends
 from test_density import crack
 
 from skfsink.density import DensitySolver
-from skfsink.explicit import Explicit, ExplicitControls, highest_frequency
+from skfsink.explicit import Explicit, ExplicitControls
+from skfsink.frequency import highest_frequency
 from skfsink.hht import HHT, HHTControls
 from skfsink.material import AAA, SinkLaw
 from skfsink.momentum import Momentum

@@ -72,7 +72,7 @@ def _scene(own: dict[str, Any], options: Options) -> Scene:
         raise ParameterError(f"mesh must be the path of a mesh file; got {own['mesh']!r}")
     if not own["grips"] and not own["tractions"]:
         raise ParameterError("grips: a scene needs at least one grip or traction; a deck has them as [[grips]]")
-    if options.speed != Options().speed:
+    if options.speed != Options.speed:
         raise ParameterError(f"speed is for the cases of the paper; a grip of a custom scene has its own velocity; "
                              f"got {options.speed:g}")
     for name in ("half", "dimensions", "mesh_layout"):

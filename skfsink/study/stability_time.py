@@ -11,7 +11,8 @@ from matplotlib.axes import Axes
 
 from ..density import DensitySolver
 from ..energy import Ledger
-from ..explicit import Explicit, ExplicitControls, highest_frequency
+from ..explicit import Explicit, ExplicitControls
+from ..frequency import highest_frequency
 from ..hht import HHTControls
 from ..material import AAA, SinkLaw
 from ..momentum import Momentum
