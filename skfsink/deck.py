@@ -27,7 +27,7 @@ from .errors import OutputError, ParameterError
 from .options import Options
 from .result import Result
 from .tables import TABLES, joined, read_tables
-from .units import UNITS, in_unit
+from .units import UNITS, number_in
 
 __all__ = ["CASES", "Deck", "case_function", "parameters_of", "read_deck", "read_value", "stored_case"]
 
@@ -155,10 +155,4 @@ def read_value(name: str, value: Any, known: Mapping[str, Any]) -> Any:
         if not isinstance(value, str) or not value.isprintable():
             raise ParameterError(f"{name} must be text; got {value!r}")
         return value
-    if isinstance(value, str):
-        return in_unit(name, value, UNITS.get(name, ""))
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        unit = UNITS.get(name)
-        also = f", or text with a unit such as '1.5 {unit}'" if unit else ""
-        raise ParameterError(f"{name} must be a number{also}; got {value!r}")
-    return value
+    return number_in(name, value, UNITS.get(name, ""))

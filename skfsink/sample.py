@@ -52,7 +52,7 @@ class Sample:
         MeshError
             The mesh has no such boundary.
         """
-        return self._of(self.boundaries, "boundary", boundary)
+        return _named(self.boundaries, boundary, f"mesh {self.name} has no boundary {boundary!r}")
 
     def elements(self, name: str) -> np.ndarray:
         """Elements of a named set.
@@ -62,13 +62,7 @@ class Sample:
         MeshError
             The mesh has no such set.
         """
-        return self._of(self.cells, "set of elements", name)
-
-    def _of(self, sets: Mapping[str, np.ndarray], kind: str, name: str) -> np.ndarray:
-        if name not in sets:
-            raise MeshError(f"mesh {self.name} has no {kind} {name!r}; it has "
-                            f"{one_line(', '.join(sorted(sets))) or 'none'}")
-        return sets[name]
+        return _named(self.cells, name, f"mesh {self.name} has no set of elements {name!r}")
 
     def rim(self, *faces: str) -> np.ndarray:
         """Nodes of the outer boundary without the named `faces`, but with the edges of these."""
@@ -76,6 +70,12 @@ class Sample:
         for name in set(faces) & self.boundaries.keys():
             facets = facets[:, ~np.isin(facets, self.boundaries[name]).all(axis=0)]
         return np.unique(facets)
+
+
+def _named(sets: Mapping[str, np.ndarray], name: str, failure: str) -> np.ndarray:
+    if name not in sets:
+        raise MeshError(f"{failure}; it has {one_line(', '.join(sorted(sets))) or 'none'}")
+    return sets[name]
 
 
 def data_roots() -> tuple[Path, ...]:

@@ -16,7 +16,7 @@ from typing import Any
 from .errors import ParameterError, require
 from .loads import Grip, Ramp, Traction
 from .material import LIMITERS, MATERIALS, Material, SinkLaw, material_of
-from .units import in_unit
+from .units import number_in
 
 __all__ = ["TABLES", "RegionLaw", "grip_from", "grips_of", "joined", "read_tables", "region_from", "split",
            "traction_from", "tractions_of"]
@@ -73,11 +73,7 @@ def _table(kind: str, table: Any, needed: str, known: Sequence[str]) -> Mapping[
 
 
 def _number(name: str, value: Any, unit: str) -> float:
-    if isinstance(value, str):
-        return in_unit(name, value, unit)
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ParameterError(f"{name} must be a number, or text with a unit such as '1.5 {unit}'; got {value!r:.80}")
-    return require(name, value, unit)
+    return require(name, number_in(name, value, unit), unit)
 
 
 def _course(name: str, value: Any, rate: str, unit: str) -> float | Ramp:

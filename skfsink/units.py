@@ -8,7 +8,7 @@ from typing import Any
 
 from .errors import ParameterError
 
-__all__ = ["UNITS", "in_unit"]
+__all__ = ["UNITS", "in_unit", "number_in"]
 
 #: unit of each parameter that has one; the other numbers are pure
 UNITS = {
@@ -54,6 +54,22 @@ def in_unit(name: str, text: str, unit: str, plain: bool = False) -> float:
     except ValueError as error:
         raise ParameterError(f"{name} must be {wanted}, such as {_example(unit)}; got {text[:LONGEST]!r}"
                              + (f" ({error})" if str(error) else "")) from None
+
+
+def number_in(name: str, value: Any, unit: str) -> Any:
+    """A number of a deck as it is, or its text in `unit`.
+
+    Raises
+    ------
+    ParameterError
+        It is neither, or as of :func:`in_unit`.
+    """
+    if isinstance(value, str):
+        return in_unit(name, value, unit)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        also = f", or text with a unit such as '1.5 {unit}'" if unit else ""
+        raise ParameterError(f"{name} must be a number{also}; got {value!r:.80}")
+    return value
 
 
 def _example(unit: str) -> str:

@@ -11,7 +11,7 @@ import skfem
 
 from skfsink.density import DensitySolver
 from skfsink.energy import Ledger
-from skfsink.material import AAA, SinkLaw
+from skfsink.material import AAA, Material, SinkLaw
 from skfsink.momentum import Momentum
 from skfsink.regions import Region
 from skfsink.space import Space
@@ -114,3 +114,18 @@ def at_onset(space: Space, speed: float = 1e-3, overshoot: float = 0.01, regions
     state.grip *= 1 + overshoot
     state.time, state.step, state.ledger = 0.0, 0, Ledger()
     return Fracture(lambda: copy.deepcopy(state), momentum, density, free, velocity)
+
+
+def momentum_of(space: Space, material: Material, gamma: np.ndarray, element: str = "jbar",
+                regions: Sequence[Region] = (), threads: int = 1) -> Momentum:
+    """The momentum balance at the relative density `gamma` (ne, nq) of the Gauss points."""
+    momentum = Momentum(space, material, element, regions=regions, threads=threads)
+    momentum.gamma = gamma
+    momentum.tiles.set_gamma(gamma)
+    return momentum
+
+
+def close(got, expected, tolerance: float = 1e-12) -> None:
+    """Assert that arrays differ by at most `tolerance` of their greatest entry."""
+    error = abs(got - expected).max() / abs(expected).max()
+    assert error <= tolerance, f"relative difference {error:.2e}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bodies import boundary, box, ends, patchy, wavy
+from bodies import boundary, box, close, ends, momentum_of, patchy, wavy
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
@@ -195,18 +195,6 @@ def test_far_stretched_fibres_stay_finite_and_continuous():
 
 
 # --- the element loops ---
-def momentum_of(space: Space, material: Material, gamma: np.ndarray, element: str = "jbar") -> Momentum:
-    momentum = Momentum(space, material, element)
-    momentum.gamma = gamma
-    momentum.tiles.set_gamma(gamma)
-    return momentum
-
-
-def close(got, expected, tolerance: float = 1e-12) -> None:
-    error = abs(got - expected).max() / abs(expected).max()
-    assert error <= tolerance, f"relative difference {error:.2e}"
-
-
 @pytest.fixture(params=["quad", "hex"])
 def body(request: pytest.FixtureRequest) -> Space:
     """A distorted body of 81 quadrilaterals (two tiles, one partly filled), or eight hexahedra."""
