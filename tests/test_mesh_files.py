@@ -21,7 +21,7 @@ from hypothesis import strategies as st
 from plates import plate
 
 from skfsink.errors import MeshError, SkfsinkError
-from skfsink.mesh_file import read_mesh_file
+from skfsink.mesh_file import check_mesh, read_mesh_file
 from skfsink.meshing import write_mesh
 from skfsink.sample import Sample, file_sample, load_sample
 
@@ -386,6 +386,15 @@ def test_sets_of_nodes_that_do_not_exist(tmp_path: Path) -> None:
         path.write_bytes(template("inp") + f"\n*NSET, NSET=far\n{nodes}\n".encode())
         found = outcome(path)
         assert "plate.inp" in found if isinstance(found, str) else "far" not in found.boundaries, (nodes, found)
+
+
+@pytest.mark.parametrize("node", [-1, 999])
+def test_sets_of_nodes_are_checked_whoever_read_them(node: int) -> None:
+    """Fails if a reader that does not look at its sets of nodes is believed."""
+    mesh = plate(5)
+    mesh.point_sets = {"far": np.array([0, node])}
+    with pytest.raises(MeshError, match="the boundary 'far' has nodes that do not exist"):
+        check_mesh("odd", mesh)
 
 
 def test_boundaries_with_odd_names(tmp_path: Path) -> None:
