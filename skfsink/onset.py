@@ -10,10 +10,11 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from .density import DensitySolver
+from .density import Density, DensitySolver
 from .errors import ConvergenceError, require
 from .loading import Loading
 from .momentum import Momentum
@@ -58,6 +59,16 @@ class StaticsControls:
         require("onset-tolerance", self.onset_tolerance, low=0, high=0.1, low_open=True)
         require("max-newton", self.max_newton, low=3, whole=True)
         require("max-passes", self.max_passes, low=3, whole=True)
+
+
+class _Settled(NamedTuple):
+    """Both fields in equilibrium, and the stored energy then."""
+
+    u: np.ndarray
+    force: np.ndarray
+    density: Density
+    W_max: np.ndarray
+    W: np.ndarray
 
 
 class StaticLoading:
@@ -139,10 +150,10 @@ class StaticLoading:
         return knot if knot - t <= 1.001 * increment else t + increment
 
     # --- both fields ---
-    def _settle(self, state: State, u: np.ndarray) -> tuple[np.ndarray, ...] | None:
-        """Iterate the two fields from the guess `u`; (u, force, gamma, W_max, W), or None if they run away."""
+    def _settle(self, state: State, u: np.ndarray) -> _Settled | None:
+        """Iterate the two fields from the guess `u`; None if they run away."""
         c = self.controls
-        gamma, W_max = state.gamma, state.W_max
+        density, W_max = Density(state.gamma, state.sink), state.W_max
         last, growing, self.refused = np.inf, 0, "no equilibrium"
         for _ in range(c.max_passes):
             try:
@@ -151,12 +162,12 @@ class StaticLoading:
                 return None
             W = self.momentum.W
             W_max = np.maximum(state.W_max, W)
-            new = self.density.solve(W_max, gamma)
-            change = float(np.abs(new - gamma).max())
-            gamma = new
+            gamma, density = density.gamma, self.density.update(W_max, density)
+            change = float(np.abs(density.gamma - gamma).max())
+            gamma = density.gamma
             self.momentum.set_gamma(gamma, state.deleted)
             if change <= c.gamma_tolerance:
-                return u, force, gamma, W_max, W
+                return _Settled(u, force, density, W_max, W)
             growing, self.factor = growing + 1 if change > 0.98 * last else 0, change / last
             if growing >= 3 or gamma.min() < 0.2:
                 self.refused = "runs away"
@@ -209,14 +220,14 @@ class StaticLoading:
                     self.momentum.force(state.u)
                     return
                 continue
-            u, new_force, gamma, W_max, W_new = settled
-            ledger.work += 0.5 * float(np.sum((force + new_force)[held] * (u - state.u)[held]))
+            ledger.work += 0.5 * float(np.sum((force + settled.force)[held] * (settled.u - state.u)[held]))
             if dead is not None and before is not None:
-                ledger.work += dead.changed(before, 0.5 * (state.u + u))
+                ledger.work += dead.changed(before, 0.5 * (state.u + settled.u))
             intact = self.momentum.effective(state.gamma, state.deleted)
-            ledger.drop(self.space.w, 0.5 * (W + W_new), intact, self.momentum.gamma)
-            state.u, state.gamma, state.W_max = u, gamma, W_max
-            force, W = self.momentum.force(state.u), W_new  # at the settled gamma, as after a resume
+            ledger.drop(self.space.w, 0.5 * (W + settled.W), intact, self.momentum.gamma)
+            state.u, state.gamma, state.sink = settled.u, settled.density.gamma, settled.density.sink
+            state.W_max = settled.W_max
+            force, W = self.momentum.force(state.u), settled.W  # at the settled gamma, as after a resume
             if end == self.loading.knot(state.grip):
                 self.increment = 0.0  # the next one is by the rates that follow
             state.grip = state.time = end

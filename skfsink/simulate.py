@@ -245,8 +245,7 @@ class Simulation:
 
     def checkpoint(self) -> None:
         """Write the checkpoint."""
-        memories = {"tracker": self.recorder.tracker.memory(), "statics": self.statics.memory(),
-                    "density": self.density.memory()}
+        memories = {"tracker": self.recorder.tracker.memory(), "statics": self.statics.memory()}
         if self.integrator is not None:
             self.integrator.sync(self.state)
             memories["integrator"] = self.integrator.memory()
@@ -257,7 +256,6 @@ class Simulation:
         self.state = state
         self.recorder.tracker.restore(memories["tracker"])
         self.statics.restore(memories["statics"])
-        self.density.restore(memories.get("density", {}))
         cost = extra["cost"]
         self.wall.update(cost.pop("wall"))
         self.counts.update(cost)
@@ -275,5 +273,5 @@ def onset_copy(state: State) -> State:
     """An independent copy of a loaded state, to start another analysis from."""
     return dataclasses.replace(
         state, u=state.u.copy(), v=state.v.copy(), a=state.a.copy(), gamma=state.gamma.copy(),
-        W_max=state.W_max.copy(), deleted=state.deleted.copy(), deletions=list(state.deletions),
+        W_max=state.W_max.copy(), sink=None if state.sink is None else state.sink.copy(), deleted=state.deleted.copy(), deletions=list(state.deletions),
         ledger=dataclasses.replace(state.ledger))

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from .deletion import delete_failed
+from .density import Density
 from .errors import ConvergenceError
 from .onset import StaticLoading, StaticsControls
 from .state import State
@@ -59,10 +60,11 @@ class Statics(StaticLoading):
                 ledger.released += before - self.momentum.potential
             W, loads = self.momentum.W, None if dead is None else dead.values
             postponed = self._follow(state, W)
-            gamma = self.density.solve(state.W_max, state.gamma)
+            new = self.density.update(state.W_max, Density(state.gamma, state.sink))
+            gamma = new.gamma
             change = float(np.abs(gamma - state.gamma).max())
             old = self.momentum.gamma
-            state.gamma = gamma
+            state.gamma, state.sink = gamma, new.sink
             state.step += 1
             state.time = float(state.step)
             undeleted = self.momentum.effective(gamma, state.deleted)
