@@ -126,7 +126,7 @@ class DensitySolver:
         """
         if not np.isfinite(W_max.max()):  # infinite, it would make a dead point in silence
             raise ConvergenceError("the stored energy of a Gauss point is not finite: lower --courant or --hht-dt")
-        sink = self._coefficients(W_max)
+        sink = self.coefficients(W_max)
         if before.sink is not None and not _changed(sink, before.sink, self.unchanged):
             self.skipped += 1
             return before
@@ -142,7 +142,7 @@ class DensitySolver:
                                    f"mesh has elements so flat that the lumped sink loses its maximum principle")
         return Density(result, sink, zones)
 
-    def _coefficients(self, W_max: np.ndarray) -> np.ndarray:
+    def coefficients(self, W_max: np.ndarray) -> np.ndarray:
         """Sink coefficients 1/(H + eps) of Eq. (9, 10), (ne, nq), each element by its law."""
         if len(self._parts) == 1:
             return self.law.coefficients(W_max)

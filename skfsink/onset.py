@@ -1,8 +1,10 @@
 """Static loading to the onset of failure, and what it shares with quasi-static propagation.
 
 Grips and dead loads follow the load time, the clock of the loading. Up to a sharp limit the loaded body is elastic
-and gamma hardly moves; beyond it no static solution exists. Loading looks for that limit, the *onset*, by bisection on
-the load.
+and gamma hardly moves; beyond it no stable equilibrium exists. Loading looks for that limit, the *onset*, by bisection
+on the load. Before a crack can begin the whole body may soften: the load then falls while the grips go on. Such
+equilibria are followed as long as they are stable, which is tested there (see :meth:`StaticLoading.stable`), so that the
+onset is the last stable state, and the strength the greatest load on the way to it.
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ import numpy as np
 
 from .density import Density, DensitySolver
 from .errors import ConvergenceError, require
+from .indicators import greatest_stretch
 from .loading import Loading
 from .momentum import Momentum
 from .newton import Newton
@@ -83,6 +86,10 @@ class StaticLoading:
     deletion: gamma at which an element fails.
     """
 
+    FINE = 1 / 16, 0.01  # of the largest increment, and of the way so far: increments where the load falls
+    PERTURBED = 1e-3, 12  # change of gamma by which stability is tested, and passes for it
+    OVER = 2.0      # least W/Phi of all points at which a body that has not failed is no body of this theory
+    STRETCHED = 20.0  # greatest stretch to which a body is loaded
     STALLED = 0.9  # factor of the changes of gamma a pass from which on the load is within 0.1 % of the onset
     LEAST = 1e-6  # part of the first increment at which a body without load is given up
 
@@ -96,7 +103,9 @@ class StaticLoading:
         self._size = float(np.ptp(self.space.X, axis=0).max())
         self.newton = Newton(momentum, free, self.controls.tolerance, self.controls.max_newton, threads)
         self.increment = 0.0      #: current load increment, as load time [s]; 0 before the first
-        self.refused = ""         #: why the last increment was given up: "no equilibrium", "runs away" or "passes"
+        self.refused = ""         #: why the last increment was given up: "no equilibrium", "runs away", "passes",
+        #: "falls" (the load does, and the increment is too long to follow it) or "unstable"
+        self.unfailed = ""        #: why loading has ended without an onset; empty where there was one
         self.factor = 0.0         #: ratio of the last two changes of gamma in the iteration of the two fields
 
     def equilibrium(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -176,16 +185,60 @@ class StaticLoading:
         self.refused = "passes"
         return None
 
+    def stable(self, state: State, settled: _Settled) -> bool:
+        """Whether a state that has settled stays as it is when gamma is perturbed at fixed grips.
+
+        A weakening of gamma by chance, uneven as that of a real material, is put through the two fields again and
+        again, each time made as large as at first: power iteration on the iteration of the two fields. What grows there
+        runs away.
+        """
+        size, passes = self.PERTURBED
+        u, gamma = settled.u, settled.density.gamma
+        change = -np.random.default_rng(0).random(gamma.size)
+        growth = 0.0
+        for _ in range(passes):
+            self.momentum.set_gamma(gamma + size / np.abs(change).max() * change, state.deleted)
+            try:
+                u, _ = self.newton.equilibrium(u)
+            except ConvergenceError:
+                return False
+            change = self.density.solve(np.maximum(settled.W_max, self.momentum.W), gamma) - gamma
+            growth = float(np.abs(change).max()) / size
+            if growth == 0.0:
+                break
+        return growth < 1.0
+
+    def _falls(self, state: State, settled: _Settled, force: np.ndarray) -> bool:
+        """Whether the force on the grips falls along their motion from `force` (n, dim) on, because gamma has."""
+        held = ~self.free.reshape(state.u.shape)
+        move = (settled.u - state.u)[held]
+        least = 1e-6 * float(np.linalg.norm(force[held]) * np.linalg.norm(move))
+        if not float((settled.force - force)[held] @ move) < -least:
+            return False
+        self.momentum.set_gamma(state.gamma, state.deleted)
+        elastic = self.momentum.force(settled.u)
+        self.momentum.set_gamma(settled.density.gamma, state.deleted)
+        return float((elastic - force)[held] @ move) >= 0.0
+
+    def _refused(self, state: State, settled: _Settled, increment: float, force: np.ndarray) -> str:
+        """Why an increment at whose end the body has settled cannot be taken; empty if it can."""
+        if not self._falls(state, settled, force):
+            return ""
+        if increment > min(self.FINE[0] * self._longest(state.grip), self.FINE[1] * self._age(state.grip)):
+            return "falls"
+        return "" if self.stable(state, settled) else "unstable"
+
     def load(self, state: State) -> Iterator[State]:
         """Load `state` to the onset, yielding it after each accepted increment; the last one is the onset.
 
         An increment ends at the next knot of the loading at the latest; a stretch in which nothing moves is passed
-        over. The ledger's work is trapezoidal, so its balance shows the error of the increments.
+        over. The ledger's work is trapezoidal, so its balance shows the error of the increments. Where nothing moves
+        any more, or the body has been loaded beyond sense without failing, loading ends, and `unfailed` says why.
 
         Raises
         ------
         ConvergenceError
-            There is no equilibrium under the smallest increment, or nothing moves any more and there was no onset.
+            There is no equilibrium under the smallest increment.
         """
         c, dead = self.controls, self.momentum.dead
         ledger = state.ledger
@@ -194,10 +247,11 @@ class StaticLoading:
         self.momentum.set_gamma(state.gamma, state.deleted)
         force = self.momentum.force(state.u)
         W = self.momentum.W
-        while True:
+        while not self._beyond(state, W):
             longest = self._longest(state.grip)
             if longest == np.inf:
-                self._pass_over(state, float((W / self.density.phi)[self.momentum.gamma > 0].max(initial=0.0)))
+                state.grip = state.time = self.loading.knot(state.grip)
+                self.momentum.set_time(state.grip)
                 continue
             self.increment = self.increment or longest
             end = self._end(state.grip, self.increment)
@@ -209,6 +263,8 @@ class StaticLoading:
                 settled = self._settle(state, self._predict(state.u, increment, state.grip))
             except ConvergenceError:
                 settled, self.refused = None, "no equilibrium"
+            if settled is not None and (reason := self._refused(state, settled, increment, force)):
+                settled, self.refused = None, reason
             if settled is None:
                 self.increment = 0.5 * increment
                 self.momentum.set_time(state.grip)
@@ -224,6 +280,7 @@ class StaticLoading:
             if dead is not None and before is not None:
                 ledger.work += dead.changed(before, 0.5 * (state.u + settled.u))
             intact = self.momentum.effective(state.gamma, state.deleted)
+            self.momentum.set_gamma(settled.density.gamma, state.deleted)
             ledger.drop(self.space.w, 0.5 * (W + settled.W), intact, self.momentum.gamma)
             state.u, state.gamma, state.sink = settled.u, settled.density.gamma, settled.density.sink
             state.W_max = settled.W_max
@@ -235,6 +292,23 @@ class StaticLoading:
             ledger.elastic, ledger.loads = self.momentum.energy, self.momentum.loads
             yield state
 
+    def _beyond(self, state: State, W: np.ndarray) -> bool:
+        """Whether there is nothing more to load, or no sense in it; `unfailed` takes the reason."""
+        live = self.momentum.effective(state.gamma, state.deleted) > 0  # not those of an increment given up
+        over = float((W / self.density.phi)[live].min(initial=np.inf))
+        if self._longest(state.grip) == np.inf and self.loading.knot(state.grip) == np.inf:
+            self.unfailed = f"nothing moves after load time {state.grip:.4g} s"
+        elif over > self.OVER:
+            self.unfailed = f"every point is past its energy limiter, by W/Phi = {over:.3g} and more"
+            log.warning("no point has failed, although all are past their energy limiter (the least W/Phi is %.3g, "
+                        "points fail near 1): loading ends; the regions' phi, m and the length l do not belong to this "
+                        "body", over)
+        elif (stretch := greatest_stretch(self.space, state.u)) > self.STRETCHED:
+            self.unfailed = f"the body is stretched by more than {self.STRETCHED:g}"
+            log.warning("the body is stretched by %.3g without failing (the most is %g): loading ends; lower --phi, or "
+                        "take a material that stiffens", stretch, self.STRETCHED)
+        return bool(self.unfailed)
+
     def _doubt(self) -> None:
         """Say so where the onset is not where the sink runs away."""
         if self.refused == "passes" and self.factor < self.STALLED:
@@ -244,16 +318,6 @@ class StaticLoading:
         elif self.refused == "no equilibrium":
             log.warning("the onset is where Newton's method ends, not where the sink runs away: the body may buckle or "
                         "be torn by its grips; refine the mesh, or check grips and constants")
-
-    def _pass_over(self, state: State, reached: float) -> None:
-        """Go on to the next knot, where nothing moves before it; `reached` is the greatest W/Phi."""
-        knot = self.loading.knot(state.grip)
-        if knot == np.inf:
-            raise ConvergenceError(f"nothing moves after load time {state.grip:.4g} s, and nothing has failed: the "
-                                   f"greatest W/Phi is {reached:.3g}, where points fail near 1; let a ramp go further, "
-                                   f"or give a grip or traction a rate")
-        state.grip = state.time = knot
-        self.momentum.set_time(knot)
 
     # --- checkpoints ---
     def memory(self) -> dict[str, np.ndarray]:
