@@ -136,7 +136,7 @@ class StaticLoading:
         by_grips = increment * self._size / speed if speed > 0.0 else np.inf
         return min(by_grips, increment * 2.0 * self.momentum.material.shear_modulus / pull if pull > 0.0 else np.inf)
 
-    def _path(self, t: float) -> float:
+    def way(self, t: float) -> float:
         """Length of the way to load time `t`, in the largest increments; the measure of the load."""
         total, start = 0.0, 0.0
         while start < t:
@@ -147,7 +147,7 @@ class StaticLoading:
 
     def _age(self, t: float) -> float:
         """Time the way to load time `t` would have taken at the rates from `t` on: `t` itself without ramps [s]."""
-        return self._path(t) * self._longest(t) if self.loading.knots else t
+        return self.way(t) * self._longest(t) if self.loading.knots else t
 
     def past(self, t: float, share: float) -> float:
         """The load time at which the load has grown by `share` since load time `t` [s]."""

@@ -44,7 +44,7 @@ class Statics(StaticLoading):
             There is no equilibrium, as under dead loads alone; or points wait that are never let go.
         """
         ledger, dead = state.ledger, self.momentum.dead
-        furthest, idle = limit * self._path(state.grip), 0
+        furthest, idle = limit * self.way(state.grip), 0
         self.momentum.set_time(state.grip)
         if state.step == 0:
             self.momentum.set_gamma(state.gamma, state.deleted)
@@ -58,7 +58,7 @@ class Statics(StaticLoading):
                 if not self._advance(state, advance):
                     self.arrested = f"nothing moves after load time {state.grip:.4g} s"
                     return
-                if self._path(state.grip) > furthest:
+                if self.way(state.grip) > furthest:
                     self.arrested = f"the grips are at {limit:g} times their way to the onset"
                     return
             else:
