@@ -15,6 +15,7 @@ from skfem.io.meshio import INV_HEX_MAPPING
 
 from .errors import MeshError, ParameterError, require
 from .mesh_file import one_line, quietly, read_mesh_file
+from .mesh_files.tidy import notes_of
 from .meshing import read_mesh
 from .shapes import SHAPES
 from .space import Space
@@ -35,6 +36,7 @@ class Sample:
     space: spaces on it.
     boundaries: nodes of each named boundary, ascending.
     cells: numbers of the elements of each named set, ascending.
+    notes: what was done to the mesh of a file while it was read, one line each.
     made: whether the mesh was made by gmsh, and is not a file of the user's or a committed one.
     """
 
@@ -43,6 +45,7 @@ class Sample:
     boundaries: Mapping[str, np.ndarray]
     made: bool = False
     cells: Mapping[str, np.ndarray] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
     def nodes(self, boundary: str) -> np.ndarray:
         """Nodes of a named boundary.
@@ -52,7 +55,8 @@ class Sample:
         MeshError
             The mesh has no such boundary.
         """
-        return _named(self.boundaries, boundary, f"mesh {self.name} has no boundary {boundary!r}")
+        why = "".join(f" ({note})" for note in self.notes if note.startswith(f"the boundary {boundary!r} "))
+        return _named(self.boundaries, boundary, f"mesh {self.name} has no boundary {boundary!r}{why}")
 
     def elements(self, name: str) -> np.ndarray:
         """Elements of a named set.
@@ -206,7 +210,7 @@ def _from_meshio(name: str, data: meshio.Mesh, made: bool = False) -> Sample:
         space = Space(mesh_class(np.ascontiguousarray(points.T), np.ascontiguousarray(connectivity.astype(np.int64))))
     except MeshError as error:
         raise MeshError(f"mesh {shown}: {error}") from None
-    return Sample(Path(name).stem, space, _boundaries(data, facet), made, _elements(data, kind))
+    return Sample(Path(name).stem, space, _boundaries(data, facet), made, _elements(data, kind), notes_of(data))
 
 
 def _elements(data: meshio.Mesh, kind: str) -> dict[str, np.ndarray]:
