@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import shlex
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -14,8 +15,9 @@ import skfem
 from skfem.io.meshio import INV_HEX_MAPPING
 
 from .errors import MeshError, ParameterError, require
-from .mesh_file import one_line, quietly, read_mesh_file
-from .mesh_files.tidy import notes_of
+from .mesh_file import check_mesh, one_line, quietly, read_mesh_file
+from .mesh_files.pieces import check_one_piece, hinges, merged
+from .mesh_files.tidy import notes_of, place
 from .meshing import read_mesh
 from .shapes import SHAPES
 from .space import Space
@@ -120,11 +122,11 @@ def load_sample(case: str, mesh: str, make: Callable[[], meshio.Mesh] | None = N
         return _from_meshio(mesh, lift(quietly(lambda: read_mesh(path), f"the mesh file {path} cannot be read")))
     if not Path(mesh).suffix:
         raise MeshError(f"mesh must be one of {', '.join(known)}, or the path of a mesh file; got {mesh!r}")
-    return _from_meshio(mesh, read_mesh_file(Path(mesh)))
+    return _from_file(Path(mesh))
 
 
-def file_sample(path: Path) -> Sample:
-    """The sample in a mesh file, whose sides have names.
+def file_sample(path: Path, merge_nodes: float = 0.0) -> Sample:
+    """The sample in a mesh file, whose sides have names; nodes within `merge_nodes` [mm] of each other become one.
 
     A boundary that the mesh does not name itself may be called `left` or `right` (nodes of least and greatest x),
     `bottom` or `top` (y), `back` or `front` (z).
@@ -134,7 +136,7 @@ def file_sample(path: Path) -> Sample:
     MeshError
         As of :func:`load_sample`.
     """
-    sample = _from_meshio(str(path), read_mesh_file(path))
+    sample = _from_file(path, merge_nodes)
     X = sample.space.X
     near = SIDE * float(np.ptp(X, axis=0).max())
     sides = {}
@@ -189,6 +191,23 @@ def _changed(case: str, own: Mapping[str, Any], settings: Mapping[str, Any]) -> 
 
 def _as_it_is(mesh: meshio.Mesh) -> meshio.Mesh:
     return mesh
+
+
+def _from_file(path: Path, merge_nodes: float = 0.0) -> Sample:
+    """The sample in a mesh file, in one piece."""
+    name = one_line(str(path))
+    data = read_mesh_file(path)
+    if merge_nodes:
+        check_mesh(name, merged(name, data, merge_nodes))
+    sample = _from_meshio(str(path), data)
+    check_one_piece(sample.name, shlex.quote(name), sample.space)
+    if len(nodes := hinges(sample.space)):
+        what = "node" if sample.space.dim == 2 else "node or edge"
+        note = (f"parts of the body hang together by a single {what}, at {len(nodes)} node(s), such as "
+                f"{place(sample.space.X[nodes[0]])} mm: a hinge, or a crack that goes too far; if it is not meant, "
+                f"mend the mesh there")
+        sample = replace(sample, notes=(*sample.notes, note))
+    return sample
 
 
 def _from_meshio(name: str, data: meshio.Mesh, made: bool = False) -> Sample:

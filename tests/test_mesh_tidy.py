@@ -8,10 +8,11 @@ from pathlib import Path
 import meshio
 import numpy as np
 import pytest
-from plates import plate
+from plates import contents, invoke_program, plate
 
 from skfsink.errors import MeshError
 from skfsink.mesh_file import read_mesh_file
+from skfsink.mesh_files.pieces import hinges, merged
 from skfsink.mesh_files.tidy import base_of, tidied
 from skfsink.meshing import write_mesh
 from skfsink.sample import Sample, file_sample
@@ -141,3 +142,115 @@ def test_what_is_dropped_is_not_checked(change: Callable[[meshio.Mesh], None], t
     change(mesh)
     write_mesh(tmp_path / "plate.vtu", mesh)
     assert len(read_mesh_file(tmp_path / "plate.vtu").points) == len(plate(5).points)
+
+
+# --- pieces ---
+def grid(nx: int, ny: int, at: tuple[float, float] = (0.0, 0.0), h: float = 0.5) -> meshio.Mesh:
+    """A rectangle of nx x ny squares with the corner `at`, whose left and right sides are named by lines."""
+    x, y = np.meshgrid(np.arange(nx + 1) * h, np.arange(ny + 1) * h)
+    first = (np.arange(ny)[:, None] * (nx + 1) + np.arange(nx)).ravel()
+    side = np.arange(ny) * (nx + 1)
+    lines = np.vstack([np.column_stack([side + k, side + k + nx + 1]) for k in (0, nx)])
+    return meshio.Mesh(np.column_stack([x.ravel() + at[0], y.ravel() + at[1], np.zeros(x.size)]),
+                       [("quad", first[:, None] + np.array([0, 1, nx + 2, nx + 1])), ("line", lines)],
+                       cell_sets={"left": [np.zeros(0, int), np.arange(ny)],
+                                  "right": [np.zeros(0, int), np.arange(ny) + ny]})
+
+
+def beside(*parts: meshio.Mesh) -> meshio.Mesh:
+    """Meshes in one, whose sets have the number of the part behind their names; no nodes are joined."""
+    points = np.vstack([part.points for part in parts])
+    start = np.cumsum([0, *(len(part.points) for part in parts)])
+    cells = [(block.type, block.data + at) for part, at in zip(parts, start) for block in part.cells]
+    sets = {}
+    for i, part in enumerate(parts):
+        for name, (_, lines) in part.cell_sets.items():
+            sets[f"{name}{i}"] = [np.zeros(0, int)] * (2 * i + 1) + [lines] + [np.zeros(0, int)] * 2 * (
+                len(parts) - i - 1)
+    return meshio.Mesh(points, cells, cell_sets=sets)
+
+
+@pytest.mark.parametrize(("parts", "said"), [
+    ([(2, 3, (0, 0)), (2, 3, (1, 0))], ["in 2 pieces", "(6 and 6 elements", "4 pairs of nodes coincide within 1e-6 mm",
+                                        'merge_nodes = "1e-6 mm"', "skfsink mesh ", " --merge-nodes 1e-6mm"]),
+    ([(2, 3, (0, 0)), (2, 3, (1 + 3e-5, 0))], ["4 pairs of nodes coincide within 1e-4 mm"]),
+    ([(2, 3, (0, 0)), (1, 3, (5, 0))], ["(6 and 3 elements, the smallest near (5.25, 0.25)", "no nodes of theirs",
+                                        "is 4 mm from the next", "leave the others out"]),
+    ([(2, 3, (0, 0)), (2, 3, (1, 0)), (1, 1, (9, 0))], ["in 3 pieces", "(6, 6, 1 elements", "4 pairs",
+                                                        "(2 pieces would be left)"])])
+def test_pieces_are_refused(parts: list[tuple[int, int, tuple[float, float]]], said: list[str],
+                            tmp_path: Path) -> None:
+    """Fails if a body in pieces is computed on, or the line hides how many nodes coincide and what to do."""
+    write_mesh(tmp_path / "parts.vtu", beside(*(grid(*part) for part in parts)))
+    with pytest.raises(MeshError) as error:
+        file_sample(tmp_path / "parts.vtu")
+    assert [part for part in said if part not in str(error.value)] == []
+
+
+def test_merged_pieces_are_the_whole(tmp_path: Path) -> None:
+    """Fails if merging leaves a node twice, loses one of a boundary, or does not say where."""
+    sample = sample_of(tmp_path, grid(4, 3))
+    write_mesh(tmp_path / "parts.vtu", beside(grid(2, 3), grid(2, 3, (1, 0))))
+    joined = file_sample(tmp_path / "parts.vtu", 1e-6)
+    assert joined.space.n_nodes == sample.space.n_nodes
+    assert sorted(map(tuple, joined.space.X)) == sorted(map(tuple, sample.space.X))
+    assert np.array_equal(joined.nodes("right0"), joined.nodes("left1")) and len(joined.nodes("left1")) == 4
+    assert joined.notes == ("4 node(s) were merged with others within 1e-06 mm, between (1, 0) and (1, 1.5) mm",)
+    assert file_sample(tmp_path / "plate.vtu", 1e-6).notes[0].startswith("no two nodes are within 1e-06 mm")
+
+
+def test_merge_nodes_in_a_deck(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fails if the option of a deck does not reach the mesh, is not kept by the run, or takes another unit."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("skfsink.run.draw_run", lambda *_: None)
+    write_mesh(tmp_path / "parts.vtu", beside(grid(2, 3), grid(2, 3, (1, 0))))
+    text = ('case = "custom"\n[parameters]\nmesh = "parts.vtu"\nlength_scale = 1\nevent_time = 1e-7\n{}\n[[grips]]\n'
+            'boundary = "left"\nx = 0\ny = 0\n[[grips]]\nboundary = "right"\nx = 1e-3\ny = 0\n')
+    (tmp_path / "a.toml").write_text(text.format(""))
+    status, err, _ = invoke_program("run", "a.toml", "--out", "a", "--quiet")
+    assert status == 2 and "merge_nodes" in err and not (tmp_path / "a").exists()
+    (tmp_path / "b.toml").write_text(text.format('merge_nodes = "1e-3 µm"'))
+    assert invoke_program("run", "b.toml", "--out", "b", "--quiet")[:2] == (0, "")
+    assert "merge_nodes = 1e-06" in (tmp_path / "b" / "scene.toml").read_text()
+    before = contents(tmp_path / "b")["history.csv"]
+    assert invoke_program("run", "b/scene.toml", "--out", "c", "--quiet")[0] == 0
+    assert contents(tmp_path / "c")["history.csv"] == before
+    (tmp_path / "d.toml").write_text(text.format('merge_nodes = "-1 mm"'))
+    assert "merge_nodes must be a finite number" in invoke_program("run", "d.toml", "--out", "d", "--quiet")[1]
+
+
+@pytest.mark.parametrize("tolerance", [0.5, 0.6, 1e3])
+def test_merging_collapses_no_element(tolerance: float, tmp_path: Path) -> None:
+    """Fails if a tolerance as large as an edge eats elements."""
+    write_mesh(tmp_path / "parts.vtu", beside(grid(2, 3), grid(2, 3, (1, 0))))
+    with pytest.raises(MeshError, match=r"would collapse element 0 near \(0.25, 0.25\), which has nodes 0.5 mm apart"):
+        file_sample(tmp_path / "parts.vtu", tolerance)
+
+
+def test_merging_along_a_chain(tmp_path: Path) -> None:
+    """Fails if nodes of an element become one by way of nodes of another."""
+    mesh = beside(grid(1, 1), grid(1, 1, (0.3, 0)))
+    with pytest.raises(MeshError, match="a chain of them"):
+        merged("chain", mesh, 0.4)
+
+
+def test_a_slit_is_not_closed_in_silence() -> None:
+    """Fails if the faces of a slit are merged without a word of it."""
+    mesh = beside(grid(4, 2), grid(4, 2, (0, 1)))
+    nodes = np.flatnonzero(np.isclose(mesh.points[:, 1], 1) & (mesh.points[:, 0] > 1))
+    one, two = nodes[:len(nodes) // 2], nodes[len(nodes) // 2:]
+    for block in mesh.cells:  # grown together for x > 1
+        block.data = np.where(np.isin(block.data, two), one[np.searchsorted(two, block.data).clip(max=len(one) - 1)],
+                              block.data)
+    tidied(mesh)
+    notes = merged("slit", mesh, 1e-6).info["notes"]
+    assert notes[-1].startswith("3 of the merged node(s) joined a piece to itself, between (0, 1) and (1, 1) mm")
+
+
+def test_hinges(tmp_path: Path) -> None:
+    """Fails if parts that hang together by a single node are taken for one body without a word."""
+    write_mesh(tmp_path / "hinge.vtu", merged("hinge", beside(grid(2, 2), grid(2, 2, (1, 1))), 1e-6))
+    sample = file_sample(tmp_path / "hinge.vtu")
+    assert sample.space.X[hinges(sample.space)].tolist() == [[1, 1]]
+    assert "hang together by a single node, at 1 node(s), such as (1, 1) mm" in sample.notes[-1]
+    assert not len(hinges(sample_of(tmp_path, plate(5)).space))

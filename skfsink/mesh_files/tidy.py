@@ -11,8 +11,8 @@ from collections.abc import Sequence
 import meshio
 import numpy as np
 
-__all__ = ["add_note", "body_blocks", "drop_cells", "notes_of", "place", "tidied", "without_middle_nodes",
-           "without_orphans"]
+__all__ = ["add_note", "body_blocks", "drop_cells", "notes_of", "place", "renumber", "tidied",
+           "without_middle_nodes", "without_orphans"]
 
 #: nodes at the corners of a cell; those of a cell of higher order come first in all formats that meshio reads
 CORNERS = {"vertex": 1, "line": 2, "triangle": 3, "quad": 4, "tetra": 4, "pyramid": 5, "wedge": 6, "hexahedron": 8}
@@ -120,17 +120,16 @@ def place(point: Sequence[float] | np.ndarray) -> str:
     return f"({', '.join(shown[:2] if len(shown) > 2 and float(shown[2]) == 0 else shown)})"
 
 
-def _keep(mesh: meshio.Mesh, kept: np.ndarray, lost: str) -> None:
-    """Keep only the nodes `kept`, ascending; a set of nodes that has none of them is left out with a note."""
-    if len(kept) == len(mesh.points):
-        return
-    number = np.full(len(mesh.points), -1)
-    number[kept] = np.arange(len(kept))
+def renumber(mesh: meshio.Mesh, number: np.ndarray, lost: str = "") -> None:
+    """Give each node its new number, -1 to those that no cell has; the first of those with one number is kept.
+
+    A set of nodes that has none of those kept is left out, with a note that says what was `lost`.
+    """
+    kept = np.unique(number, return_index=True)[1][int(number.min() < 0):]
     mesh.points = mesh.points[kept]
     mesh.gmsh_periodic = None
     for block in mesh.cells:
-        if isinstance(block.data, np.ndarray):
-            block.data = number[block.data].astype(block.data.dtype)
+        block.data = number[block.data].astype(block.data.dtype)
     for key, values in mesh.point_data.items():
         mesh.point_data[key] = np.asarray(values)[kept]
     for name, nodes in list(mesh.point_sets.items()):
@@ -140,6 +139,14 @@ def _keep(mesh: meshio.Mesh, kept: np.ndarray, lost: str) -> None:
             del mesh.point_sets[name]
             if not name.startswith("gmsh:"):
                 _leave_out(mesh, name, lost)
+
+
+def _keep(mesh: meshio.Mesh, kept: np.ndarray, lost: str) -> None:
+    """Keep only the nodes `kept`, ascending."""
+    if len(kept) < len(mesh.points):
+        number = np.full(len(mesh.points), -1)
+        number[kept] = np.arange(len(kept))
+        renumber(mesh, number, lost)
 
 
 def _leave_out(mesh: meshio.Mesh, name: str, lost: str) -> None:
