@@ -94,8 +94,8 @@ def read_scene(folder: Path) -> Scene:
         case = str(tomllib.loads(path.read_text(encoding="utf-8"))["case"])
         module = importlib.import_module(f"skfsink.cases.{case}")
         stored = read_parameters(folder, case)
-        own = {name: stored.pop(name) for name in inspect.signature(getattr(module, case)).parameters
-               if name != "options"}
+        own = {name: stored.pop(name, p.default)
+               for name, p in inspect.signature(getattr(module, case)).parameters.items() if name != "options"}
         options = replace(Options(), **stored, corridor=_corridor(folder))
     except (ModuleNotFoundError, UnicodeDecodeError, tomllib.TOMLDecodeError, AttributeError, KeyError,
             TypeError) as error:
@@ -136,7 +136,7 @@ def _resumed(case: str, own: dict[str, Any], defaults: dict[str, Any],
                                  f"({stored.get(name)}); a resumed run keeps its scene")
     known = {f.name for f in fields(Options)} - set(NOT_PHYSICS)
     try:
-        own = {k: stored.pop(k) for k in own}
+        own = {k: stored.pop(k, defaults[k]) for k in own}
         if unknown := stored.keys() ^ known:
             raise KeyError(*sorted(unknown))
     except KeyError as error:

@@ -1,0 +1,1 @@
+"""Reading, mending and converting of mesh files."""
