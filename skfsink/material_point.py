@@ -21,9 +21,7 @@ NEAR = 0.02  # difference of a stretch from that of a homogeneous path that is s
 def mean_deformation(momentum: Momentum, u: np.ndarray) -> np.ndarray:
     """Mean deformation gradient of the body, (3, 3); across a plane body 1, or 1/J of its plane in plane stress."""
     space = momentum.space
-    F = np.eye(3)
-    gradient = space.deformation_gradient(u)
-    F[:space.dim, :space.dim] = np.einsum("eq,eqij->ij", space.w, gradient) / space.w.sum()
+    F: np.ndarray = np.einsum("eq,eqij->ij", space.w, space.deformation_gradient(u)) / space.w.sum()
     if momentum.plane_stress:
         F[2, 2] = 1.0 / np.linalg.det(F[:2, :2])
     return F

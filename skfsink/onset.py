@@ -86,7 +86,9 @@ class StaticLoading:
     deletion: gamma at which an element fails.
     """
 
-    FINE = 1 / 16, 0.01  # of the largest increment, and of the way so far: increments where the load falls
+    SOUND = 0.999   # least gamma of a body that is as good as intact
+    SOFT = 0.5      # growth of the load, of that at the same gamma, below which a body softens
+    FINE = 1 / 16, 0.01  # of the largest increment, and of the way so far: increments of a body that softens
     PERTURBED = 1e-3, 12  # change of gamma by which stability is tested, and passes for it
     OVER = 2.0      # least W/Phi of all points at which a body that has not failed is no body of this theory
     STRETCHED = 20.0  # greatest stretch to which a body is loaded
@@ -104,7 +106,7 @@ class StaticLoading:
         self.newton = Newton(momentum, free, self.controls.tolerance, self.controls.max_newton, threads)
         self.increment = 0.0      #: current load increment, as load time [s]; 0 before the first
         self.refused = ""         #: why the last increment was given up: "no equilibrium", "runs away", "passes",
-        #: "falls" (the load does, and the increment is too long to follow it) or "unstable"
+        #: "softens" (the increment is too long to follow the load over its peak) or "unstable"
         self.unfailed = ""        #: why loading has ended without an onset; empty where there was one
         self.factor = 0.0         #: ratio of the last two changes of gamma in the iteration of the two fields
 
@@ -208,25 +210,25 @@ class StaticLoading:
                 break
         return growth < 1.0
 
-    def _falls(self, state: State, settled: _Settled, force: np.ndarray) -> bool:
-        """Whether the force on the grips falls along their motion from `force` (n, dim) on, because gamma has."""
+    def _growth(self, state: State, settled: _Settled, force: np.ndarray) -> float:
+        """How much the force on the grips grows along their motion from `force` (n, dim) on, of what it would at the
+        same gamma; 1 where that does not grow either, or is lost in rounding."""
         held = ~self.free.reshape(state.u.shape)
         move = (settled.u - state.u)[held]
-        least = 1e-6 * float(np.linalg.norm(force[held]) * np.linalg.norm(move))
-        if not float((settled.force - force)[held] @ move) < -least:
-            return False
         self.momentum.set_gamma(state.gamma, state.deleted)
-        elastic = self.momentum.force(settled.u)
+        elastic = float((self.momentum.force(settled.u) - force)[held] @ move)
         self.momentum.set_gamma(settled.density.gamma, state.deleted)
-        return float((elastic - force)[held] @ move) >= 0.0
+        if elastic <= 1e-6 * float(np.linalg.norm(force[held]) * np.linalg.norm(move)):
+            return 1.0
+        return float((settled.force - force)[held] @ move) / elastic
 
     def _refused(self, state: State, settled: _Settled, increment: float, force: np.ndarray) -> str:
         """Why an increment at whose end the body has settled cannot be taken; empty if it can."""
-        if not self._falls(state, settled, force):
+        if settled.density.gamma.min() > self.SOUND or (growth := self._growth(state, settled, force)) > self.SOFT:
             return ""
         if increment > min(self.FINE[0] * self._longest(state.grip), self.FINE[1] * self._age(state.grip)):
-            return "falls"
-        return "" if self.stable(state, settled) else "unstable"
+            return "softens"
+        return "" if growth > 0.0 or self.stable(state, settled) else "unstable"
 
     def load(self, state: State) -> Iterator[State]:
         """Load `state` to the onset, yielding it after each accepted increment; the last one is the onset.
