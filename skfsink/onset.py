@@ -87,7 +87,7 @@ class StaticLoading:
     """
 
     SOUND = 0.999   # least gamma of a body that is as good as intact
-    SOFT = 0.5      # growth of the load, of that at the same gamma, below which a body softens
+    SOFT = 0.5, 0.02  # growth of the load, of that at the same gamma, and loss of it, past which a body softens
     FINE = 1 / 16, 0.01  # of the largest increment, and of the way so far: increments of a body that softens
     PERTURBED = 1e-3, 12  # change of gamma by which stability is tested, and passes for it
     OVER = 2.0      # least W/Phi of all points at which a body that has not failed is no body of this theory
@@ -210,23 +210,30 @@ class StaticLoading:
                 break
         return growth < 1.0
 
-    def _growth(self, state: State, settled: _Settled, force: np.ndarray) -> float:
-        """How much the force on the grips grows along their motion from `force` (n, dim) on, of what it would at the
-        same gamma; 1 where that does not grow either, or is lost in rounding."""
+    def _growth(self, state: State, settled: _Settled, force: np.ndarray) -> tuple[float, float]:
+        """Growth of the force on the grips along their motion from `force` (n, dim) on, and what it loses by gamma.
+
+        The first is relative to the growth at the same gamma (1 where that is none, or lost in rounding), the second to
+        the force itself.
+        """
         held = ~self.free.reshape(state.u.shape)
         move = (settled.u - state.u)[held]
         self.momentum.set_gamma(state.gamma, state.deleted)
         elastic = float((self.momentum.force(settled.u) - force)[held] @ move)
         self.momentum.set_gamma(settled.density.gamma, state.deleted)
         if elastic <= 1e-6 * float(np.linalg.norm(force[held]) * np.linalg.norm(move)):
-            return 1.0
-        return float((settled.force - force)[held] @ move) / elastic
+            return 1.0, 0.0
+        actual = float((settled.force - force)[held] @ move)
+        return actual / elastic, (elastic - actual) / max(abs(float(settled.force[held] @ move)), actual)
 
     def _refused(self, state: State, settled: _Settled, increment: float, force: np.ndarray) -> str:
         """Why an increment at whose end the body has settled cannot be taken; empty if it can."""
-        if settled.density.gamma.min() > self.SOUND or (growth := self._growth(state, settled, force)) > self.SOFT:
+        if settled.density.gamma.min() > self.SOUND:
             return ""
-        if increment > min(self.FINE[0] * self._longest(state.grip), self.FINE[1] * self._age(state.grip)):
+        growth, loss = self._growth(state, settled, force)
+        if growth > self.SOFT[0] and loss < self.SOFT[1]:
+            return ""
+        if increment > min(self.FINE[0] * self._longest(state.grip), self.FINE[1] * self._age(state.grip + increment)):
             return "softens"
         return "" if growth > 0.0 or self.stable(state, settled) else "unstable"
 
