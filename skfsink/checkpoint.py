@@ -25,7 +25,8 @@ def _state_arrays(state: State) -> dict[str, np.ndarray]:
     times = np.array([t for t, _ in state.deletions])
     elements = np.array([e for _, e in state.deletions], np.int64)
     sink = {} if state.sink is None else {"sink": state.sink}
-    return {**{name: getattr(state, name) for name in _ARRAYS}, **sink, "deletion_times": times, "deletion_elements": elements}
+    return {**{name: getattr(state, name) for name in _ARRAYS}, **sink,
+            "deletion_times": times, "deletion_elements": elements}
 
 
 def _state_scalars(state: State) -> dict[str, Any]:
@@ -35,8 +36,8 @@ def _state_scalars(state: State) -> dict[str, Any]:
 
 def _rebuild(arrays: dict[str, np.ndarray], scalars: dict[str, Any]) -> State:
     log = list(zip(arrays["deletion_times"].tolist(), arrays["deletion_elements"].tolist()))
-    return State(**{name: arrays[name] for name in _ARRAYS}, sink=arrays.get("sink"), deletions=log, grip=scalars["grip"],
-                 time=scalars["time"], step=scalars["step"], phase=scalars["phase"],
+    return State(**{name: arrays[name] for name in _ARRAYS}, sink=arrays.get("sink"), deletions=log,
+                 grip=scalars["grip"], time=scalars["time"], step=scalars["step"], phase=scalars["phase"],
                  ledger=Ledger(**scalars["ledger"]))
 
 

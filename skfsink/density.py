@@ -125,7 +125,7 @@ class DensitySolver:
             The history is not finite, or the lumped solution leaves (0, 1] by more than the solver's tolerance.
         """
         if not np.isfinite(W_max.max()):  # infinite, it would make a dead point in silence
-            raise ConvergenceError("the stored energy of a Gauss point is not finite: lower --courant or --hht-dt")
+            raise ConvergenceError("the stored energy of a Gauss point is not finite")
         sink = self.coefficients(W_max)
         if before.sink is not None and not _changed(sink, before.sink, self.unchanged):
             self.skipped += 1

@@ -14,7 +14,7 @@ from types import TracebackType
 import numpy as np
 
 from . import indicators
-from .errors import InstabilityError
+from .errors import InstabilityError, SkfsinkError
 from .momentum import Momentum
 from .regions import Region, by_element
 from .scene import Scene
@@ -96,6 +96,7 @@ class Guard:
         self.scale = 0.0     #: energy at the onset, to which the others are compared
         self.evenness = 0.0  #: share of the body that was loaded about as much as its weakest point at the onset
         self.dissolved = False  #: whether a body that was loaded evenly has failed everywhere at once
+        self.step_share: Callable[[], float] = lambda: np.inf  #: explicit step over its stability limit, now
         self._deleted = -1   # elements at the last step
         self._inside_out = False
 
@@ -105,8 +106,18 @@ class Guard:
         if c.analysis == "quasistatic":
             return f"raise --front (now {c.statics.front:g}), or compute with --analysis dynamic"
         if c.integrator == "explicit":
+            if (share := self._share_of_limit()) <= 1.0:
+                return (f"a shorter step is no cure, since this one is {share:.2f} of its stability limit: refine the "
+                        f"mesh there, or take --integrator hht")
             return f"lower --courant (now {c.explicit.courant:g})"
         return f"lower --hht-dt (now {c.hht.dt:g} s)"
+
+    def _share_of_limit(self) -> float:
+        """The explicit step over its stability limit; infinite where that cannot be told any more."""
+        try:
+            return self.step_share()
+        except SkfsinkError:
+            return np.inf
 
     # --- before the run ---
     def check_scene(self) -> None:
@@ -175,9 +186,14 @@ class Guard:
         V = self.space.V
         return float(V[ratio >= self.EVEN[0] * ratio.max()].sum() / V.sum())
 
+    @property
+    def even(self) -> bool:
+        """Whether the body was loaded evenly at the onset, as a material point is."""
+        return self.evenness > self.EVEN[1]
+
     def _has_dissolved(self) -> bool:
         """Whether this body may fail everywhere at once, since it is loaded evenly; it has, then."""
-        self.dissolved = self.dissolved or self.evenness > self.EVEN[1]
+        self.dissolved = self.dissolved or self.even
         return self.dissolved
 
     def _check_pressure(self, state: State) -> None:

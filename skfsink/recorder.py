@@ -32,7 +32,8 @@ class Recorder:
     tracker: the crack.   tips: the crack at the last record.   guard: watches the run.
     moments: frame number of each key moment: onset, branching, arrival, end.
     onset, at_arrival: figures noted at those moments.
-    greatest: load, displacement, mean deformation gradient F and nominal stress P where the load was greatest while the body was loaded.
+    greatest: load, displacement, mean deformation gradient F and nominal stress P [MPa] where the load was greatest
+        while the body was loaded.
     loading_frames: time and label of the frames of the loading.
     """
 
@@ -73,6 +74,7 @@ class Recorder:
         quasistatic = controls.analysis == "quasistatic"
         self.guard = Guard(scene, momentum)
         self.guard.scale, self.guard.evenness = (self.onset.get(name, 0.0) for name in ("elastic_energy", "evenness"))
+        self.guard.dissolved = bool(memory.get("dissolved", False))
         self._waiting = controls.start == "rest"
         self._record_every = 1.0 if quasistatic else controls.record_every
         self._frame_every = 10.0 if quasistatic else controls.frame_every
@@ -210,5 +212,6 @@ class Recorder:
         self.series.flush()  # a checkpoint names its frames
         self.loading_series.flush()
         return {"rows": self.history.rows, "frames": self.frames, "loading_frames": self.loading_frames,
-                "framed": self._framed, "greatest": self.greatest, "moments": self.moments, "onset": self.onset,
+                "dissolved": self.guard.dissolved, "framed": self._framed, "greatest": self.greatest,
+                "moments": self.moments, "onset": self.onset,
                 "at_arrival": self.at_arrival, "separated_at": self.separated_at}

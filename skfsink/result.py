@@ -98,7 +98,7 @@ def summarize(scene: Scene, simulation: Simulation) -> dict[str, Any]:
 
 def _material_point(scene: Scene, simulation: Simulation) -> dict[str, Any] | None:
     """Strength beside theory of a body that was loaded evenly."""
-    greatest, guard = simulation.recorder.greatest, simulation.recorder.guard
-    if guard.evenness < guard.EVEN[1] or "F" not in greatest or scene.tractions:
+    greatest = simulation.recorder.greatest
+    if not simulation.recorder.guard.even or "F" not in greatest or scene.tractions:
         return None
     return beside_theory(scene, np.array(greatest["F"]), np.array(greatest["P"]))

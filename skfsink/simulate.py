@@ -182,8 +182,9 @@ class Simulation:
                                               c.deletion, threads)
             self.integrator = self._from_rest.integrator
         elif c.integrator == "explicit":
-            self.integrator = Explicit(self.momentum, self.density, self.free, self.loading, c.explicit,
-                                       c.deletion)
+            explicit = Explicit(self.momentum, self.density, self.free, self.loading, c.explicit, c.deletion)
+            self.recorder.guard.step_share = lambda: explicit.step_share(self.state)
+            self.integrator = explicit
         else:
             self.integrator = HHT(self.momentum, self.density, self.free, self.loading, c.hht, c.deletion,
                                   threads)
@@ -221,7 +222,8 @@ class Simulation:
             if recorder.watch(state, self.momentum.force(state.u), before, 0.0):
                 self._show(state, 0.0, f"sweep {state.step}")
             before = state.time
-            if self.dissolved or recorder.tracker.separated and (self.statics.settled or state.ledger.elastic < 1e-4 * scale):
+            at_rest = self.statics.settled or state.ledger.elastic < 1e-4 * scale
+            if self.dissolved or (recorder.tracker.separated and at_rest):
                 break
             self._pause("event")
         recorder.finish(state, self.momentum.force(state.u), 0.0)
@@ -292,5 +294,6 @@ def onset_copy(state: State) -> State:
     """An independent copy of a loaded state, to start another analysis from."""
     return dataclasses.replace(
         state, u=state.u.copy(), v=state.v.copy(), a=state.a.copy(), gamma=state.gamma.copy(),
-        W_max=state.W_max.copy(), sink=None if state.sink is None else state.sink.copy(), deleted=state.deleted.copy(), deletions=list(state.deletions),
+        W_max=state.W_max.copy(), sink=None if state.sink is None else state.sink.copy(),
+        deleted=state.deleted.copy(), deletions=list(state.deletions),
         ledger=dataclasses.replace(state.ledger))

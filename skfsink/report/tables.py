@@ -103,6 +103,10 @@ def key_table(runs: Sequence[Run], labels: Sequence[str], waves: Sequence[tuple[
         return _row(name, unit, [get(run) for run in runs])
 
     rows = [
+        row("greatest load while it was loaded", force, "loading", "greatest_load"),
+        row("greatest W/Φ while it was loaded", "", "loading", "greatest_W_over_phi"),
+        row("nominal strength", "MPa", "material_point", "nominal_strength_MPa"),
+        row("nominal strength by theory, incompressible", "MPa", "material_point", "nominal_strength_theory_MPa"),
         row("displacement of the grips at the onset", "mm", "onset", "displacement_mm"),
         row("load at the onset", force, "onset", "reaction_N_per_mm"),
         row("elastic energy at the onset", energy, "onset", "elastic_energy"),
@@ -137,7 +141,7 @@ def energy_tables(runs: Sequence[Run], labels: Sequence[str]) -> list[Table]:
                 for name, _, meaning in ENERGIES]
 
     if len(runs) == 1:
-        return [_table("Energies of the event", tuple(moments.values()), rows(*moments))]
+        return [_table("Energies of the event", tuple(moments.values()), rows(*moments) if runs[0].energies else [])]
     return [_table(f"Energies {moments[key]}", labels, rows(key)) for key in ("arrival", "end")]
 
 

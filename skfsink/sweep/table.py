@@ -22,6 +22,7 @@ __all__ = ["FIGURES", "draw", "read_rows", "write_csv", "write_parquet"]
 
 #: columns of the table: name, unit, and where a summary has the figure
 FIGURES = (
+    ("greatest_load", "N/mm", ("loading", "greatest_load")),
     ("onset_displacement", "mm", ("onset", "displacement_mm")),
     ("onset_load", "N/mm", ("onset", "reaction_N_per_mm")),
     ("U", "N mm/mm", ("energy", "U_paper_at_arrival")),
@@ -48,6 +49,7 @@ def read_rows(folders: Sequence[Path], varied: Sequence[Mapping[str, Any]]) -> l
         for part in parts:
             row = {**values, "analysis": part.get("analysis"), **{name: _look(part, at) for name, _, at in FIGURES}}
             row["failure"] = failure.read_text().strip() if failure.is_file() else None if part else "not finished"
+            row["verdict"] = part.get("verdict")
             row["folder"] = folder.name
             rows.append(row)
     return rows
