@@ -219,15 +219,16 @@ def _from_file(path: Path, merge_nodes: float = 0.0) -> Sample:
 
 def _from_meshio(name: str, data: meshio.Mesh, made: bool = False) -> Sample:
     shown = one_line(name)
-    present = [kind for kind in _CELLS if kind in data.cells_dict]
-    others = sorted({b.type for b in data.cells} - {"quad", "hexahedron", "line", "vertex"})
+    types = {block.type for block in data.cells if len(block.data)}
+    present = [kind for kind in _CELLS if kind in types]
+    others = sorted(types - {"quad", "hexahedron", "line", "vertex"})
     if needs_split(data):
         raise MeshError(f"mesh {shown} has {counted(data)}, and a run takes quadrilaterals or hexahedra alone: "
                         f"convert it with skfsink mesh {shlex.quote(shown)} OUT.vtu")
-    if others and any(len(data.cells_dict[kind]) for kind in present):
+    if others and present:
         raise MeshError(f"mesh {shown} has {' and '.join(others)} cells beside its elements: leave them out, or let "
                         f"skfsink mesh {shlex.quote(shown)} OUT.vtu do so")
-    if not any(len(data.cells_dict[kind]) for kind in present):
+    if not present:
         raise MeshError(f"mesh {shown} must consist of quadrilaterals or hexahedra; it has "
                         f"{', '.join(sorted({b.type for b in data.cells})) or 'no cells'}")
     kind = "hexahedron" if "hexahedron" in present else "quad"

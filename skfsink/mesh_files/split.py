@@ -14,7 +14,7 @@ import meshio
 import numpy as np
 
 from ..errors import MeshError
-from .tidy import CORNERS, add_note, base_of, body_blocks, drop_cells, place, renumber
+from .tidy import CORNERS, add_note, base_of, body_blocks, drop_cells, drop_empty, place, renumber
 
 __all__ = ["PLURALS", "counted", "drop_others", "needs_split", "split"]
 
@@ -31,7 +31,7 @@ FACES = {
     "wedge": ((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
     "hexahedron": ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))}
 #: cells of second order: the nodes in the middle of their edges follow those at the corners, in the order of EDGES
-SECOND = ("line3", "triangle6", "quad8", "quad9", "tetra10", "wedge15", "wedge18", "hexahedron20", "hexahedron27")
+SECOND = ("line3", "triangle6", "quad8", "quad9", "tetra10", "wedge18", "hexahedron20", "hexahedron27")
 OFF = 0.2  # a middle node further from the middle of its edge than this, over the edge, is not taken for it
 
 
@@ -61,16 +61,17 @@ def split(mesh: meshio.Mesh) -> meshio.Mesh:
     """A mesh of quadrilaterals, or hexahedra in space, from one of any elements but pyramids; sets go along.
 
     The middle nodes of elements of second order become the nodes in the middle of edges. A set of elements, or of lines
-    or faces, has the parts of its members. A set of nodes gains the middle of an edge or face on the outside all of
-    whose nodes it has, and that of an edge, face or element inside if one of these nodes is inside as well: a set of
-    nodes on the outside gains none inside. In space, a set with no whole face on the outside is a curve, and gains the
-    middles of outer edges; else only those of its faces.
+    or faces, has the parts of its members. A set of nodes that are all on the outside of the body gains the middles of
+    the edges and faces there that have all their nodes in it; in space only those of its faces and their edges, unless
+    it has no whole face and is a curve. A set with a node inside the body, or with all nodes, is a part of the body,
+    and gains the middles of all edges, faces and elements that have all their nodes in it.
 
     Raises
     ------
     MeshError
         There are pyramids or polygons, or edges (in space: faces) that more than two elements share.
     """
+    drop_empty(mesh)
     body = body_blocks(mesh)
     kinds = [base_of(block.type) for block in mesh.cells]
     others = sorted({kinds[i] for i in body} - set(FACES))
@@ -260,17 +261,14 @@ def _sets_of_nodes(mesh: meshio.Mesh, body: list[int], dim: int, edges: np.ndarr
     """The sets of nodes with the new ones that belong to them; see :func:`split`."""
     if not mesh.point_sets:
         return {}
-    n = len(mesh.points)
+    n, kinds = len(mesh.points), [base_of(block.type) for block in mesh.cells]
     sides = face_of if dim == 3 else edge_of
     count = np.bincount(np.concatenate([sides[i].ravel() for i in body]), minlength=len(faces if dim == 3 else edges))
     outside, outer_edge = np.zeros(n + 1, bool), count == 1
     if dim == 3:
-        outer_face, outer_edge = count == 1, np.zeros(len(edges), bool)
+        outer_face = count == 1
         outside[faces[outer_face]] = True
-        for i in body:
-            kind = base_of(mesh.cells[i].type)
-            for j, cycle in enumerate(FACES[kind]):
-                outer_edge[edge_of[i][outer_face[face_of[i][:, j]]][:, _edges_of(kind, cycle)]] = True
+        outer_edge = _bounding(edge_of, face_of, kinds, body, outer_face)
     else:
         outside[edges[outer_edge]] = True
     outside[-1] = True  # what stands for no node
@@ -278,28 +276,29 @@ def _sets_of_nodes(mesh: meshio.Mesh, body: list[int], dim: int, edges: np.ndarr
     for name, nodes in mesh.point_sets.items():
         member = np.zeros(n + 1, bool)
         member[nodes] = member[-1] = True
-        whole = member[edges].all(axis=1)
-        inner = whole & ~outer_edge & ~outside[edges].all(axis=1)
-        whole_face = member[faces].all(axis=1)
         parts = [np.asarray(nodes, np.int64)]
-        everything = all(member[c].all() for i, c in enumerate(corners) if i in body)
-        if everything:
-            parts.append(np.arange(n, n + len(edges) + len(faces)))
-        if dim == 3:
-            on = whole_face & outer_face
-            parts.append(n + len(edges) + np.flatnonzero(on | (whole_face & ~outer_face & ~outside[faces].all(axis=1))))
-            surface = np.zeros(len(edges), bool)
-            for i in body:
-                kind = base_of(mesh.cells[i].type)
-                for j, cycle in enumerate(FACES[kind]):
-                    surface[edge_of[i][on[face_of[i][:, j]]][:, _edges_of(kind, cycle)]] = True
-            outer = surface if on.any() else whole & outer_edge
+        inside = bool((~outside[np.setdiff1d(nodes, middle)]).any()) or all(member[corners[i]].all() for i in body)
+        whole, whole_face = member[edges].all(axis=1), member[faces].all(axis=1)
+        if inside:
+            parts += [n + len(edges) + np.flatnonzero(whole_face)]
+            parts += [centre[member[corners[i]].all(axis=1)] for i, centre in zip(body, centres)]
+        elif dim == 3:
+            whole_face &= outer_face
+            parts += [n + len(edges) + np.flatnonzero(whole_face)]
+            whole = _bounding(edge_of, face_of, kinds, body, whole_face) if whole_face.any() else whole & outer_edge
         else:
-            outer = whole & outer_edge
+            whole &= outer_edge
         given = np.isin(middle, nodes) & (middle >= 0)
-        parts.append(n + np.flatnonzero(np.where(middle >= 0, given, outer | inner)))
-        for i, centre in zip(body, centres):
-            all_in = member[corners[i]].all(axis=1) & (everything | ~outside[corners[i]].all(axis=1))
-            parts.append(centre[all_in])
+        parts.append(n + np.flatnonzero(np.where(middle >= 0, given, whole)))
         sets[name] = np.setdiff1d(np.unique(np.concatenate(parts)), middle[middle >= 0])
     return sets
+
+
+def _bounding(edge_of: list[np.ndarray], face_of: list[np.ndarray], kinds: list[str], body: list[int],
+              chosen: np.ndarray) -> np.ndarray:
+    """Mask of the edges of the `chosen` faces, a mask."""
+    found = np.zeros(max(int(own.max()) for own in edge_of if own.size) + 1, bool)
+    for i in body:
+        for j, cycle in enumerate(FACES[kinds[i]]):
+            found[edge_of[i][chosen[face_of[i][:, j]]][:, _edges_of(kinds[i], cycle)]] = True
+    return found
