@@ -131,20 +131,27 @@ def scaled_jacobian(points: Array, quads: Indices) -> Array:
 
 
 def write_mesh(path: str | Path, mesh: meshio.Mesh) -> None:
-    """Write a mesh to a VTU file; a cell set becomes the cell data `boundary:<name>`, 1 on its cells."""
+    """Write a mesh to a VTU file.
+
+    A cell set becomes the cell data `boundary:<name>`, 1 on its cells; a point set the point data of that name.
+    """
     flags = {BOUNDARY_PREFIX + name: [np.isin(np.arange(len(block.data)), index).astype(np.int8)
                                       for block, index in zip(mesh.cells, members, strict=True)]
              for name, members in mesh.cell_sets.items()}
     cells = [(block.type, block.data.astype(np.int32)) for block in mesh.cells]
-    meshio.write(path, meshio.Mesh(mesh.points, cells, cell_data=flags), file_format="vtu")
+    nodes = {BOUNDARY_PREFIX + name: np.isin(np.arange(len(mesh.points)), members).astype(np.int8)
+             for name, members in mesh.point_sets.items()}
+    meshio.write(path, meshio.Mesh(mesh.points, cells, point_data=nodes, cell_data=flags), file_format="vtu")
 
 
 def read_mesh(path: str | Path) -> meshio.Mesh:
-    """Read a mesh written by `write_mesh`, with the boundaries as cell sets again."""
+    """Read a mesh written by `write_mesh`, with its cell sets and point sets."""
     mesh = meshio.read(path)
     for key in [key for key in mesh.cell_data if key.startswith(BOUNDARY_PREFIX)]:
         name = key.removeprefix(BOUNDARY_PREFIX)
         mesh.cell_sets[name] = [np.flatnonzero(flags) for flags in mesh.cell_data.pop(key)]
+    for key in [key for key in mesh.point_data if key.startswith(BOUNDARY_PREFIX)]:
+        mesh.point_sets[key.removeprefix(BOUNDARY_PREFIX)] = np.flatnonzero(mesh.point_data.pop(key))
     return mesh
 
 

@@ -17,12 +17,14 @@ from skfem.io.meshio import INV_HEX_MAPPING
 from .errors import MeshError, ParameterError, require
 from .mesh_file import check_mesh, one_line, quietly, read_mesh_file
 from .mesh_files.pieces import check_one_piece, hinges, merged
+from .mesh_files.split import counted, needs_split
 from .mesh_files.tidy import notes_of, place
 from .meshing import read_mesh
 from .shapes import SHAPES
 from .space import Space
 
-__all__ = ["Sample", "data_folder", "data_roots", "file_sample", "load_sample", "shape_mesh", "shape_sample"]
+__all__ = ["Sample", "data_folder", "data_roots", "file_sample", "load_sample", "mesh_sample", "shape_mesh",
+           "shape_sample"]
 
 SIDE = 1e-6  # distance from the end of a body, over its size, within which a node is on that side
 _CELLS = {"quad": (skfem.MeshQuad, "line"), "hexahedron": (skfem.MeshHex, "quad")}
@@ -146,6 +148,11 @@ def file_sample(path: Path, merge_nodes: float = 0.0) -> Sample:
     return replace(sample, boundaries={**sides, **sample.boundaries})
 
 
+def mesh_sample(name: str, mesh: meshio.Mesh) -> Sample:
+    """The sample of a mesh, whose boundaries and elements are those that it names (MeshError)."""
+    return _from_meshio(name, mesh)
+
+
 def shape_sample(case: str, own: Mapping[str, Any], lift: Callable[[meshio.Mesh], meshio.Mesh] | None = None,
                  settings: Mapping[str, Any] | None = None) -> Sample:
     """The sample of a case whose shape is one of :data:`.shapes.SHAPES`.
@@ -212,9 +219,16 @@ def _from_file(path: Path, merge_nodes: float = 0.0) -> Sample:
 
 def _from_meshio(name: str, data: meshio.Mesh, made: bool = False) -> Sample:
     shown = one_line(name)
-    present = [kind for kind in _CELLS if kind in data.cells_dict]
-    others = sorted({b.type for b in data.cells} - {"quad", "hexahedron", "line", "vertex"})
-    if others or not any(len(data.cells_dict[kind]) for kind in present):
+    types = {block.type for block in data.cells if len(block.data)}
+    present = [kind for kind in _CELLS if kind in types]
+    others = sorted(types - {"quad", "hexahedron", "line", "vertex"})
+    if needs_split(data):
+        raise MeshError(f"mesh {shown} has {counted(data)}, and a run takes quadrilaterals or hexahedra alone: "
+                        f"convert it with skfsink mesh {shlex.quote(shown)} OUT.vtu")
+    if others and present:
+        raise MeshError(f"mesh {shown} has {' and '.join(others)} cells beside its elements: leave them out, or let "
+                        f"skfsink mesh {shlex.quote(shown)} OUT.vtu do so")
+    if not present:
         raise MeshError(f"mesh {shown} must consist of quadrilaterals or hexahedra; it has "
                         f"{', '.join(sorted({b.type for b in data.cells})) or 'no cells'}")
     kind = "hexahedron" if "hexahedron" in present else "quad"
@@ -252,5 +266,5 @@ def _boundaries(data: meshio.Mesh, facet: str) -> dict[str, np.ndarray]:
         nodes = [block.data[index].ravel() for block, index in zip(data.cells, members)
                  if block.type == facet and index is not None and len(index)]
         if nodes:
-            sets[name] = np.unique(np.concatenate(nodes))
+            sets[name] = np.unique(np.concatenate([sets.get(name, nodes[0][:0]), *nodes]))
     return sets

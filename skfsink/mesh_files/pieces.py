@@ -58,8 +58,9 @@ def check_one_piece(name: str, path: str, space: Space) -> None:
     graph = coo_array((np.ones(len(pairs), np.int8), (piece[pairs[:, 0]], piece[pairs[:, 1]])), shape=(n, n))
     left = connected_components(graph, directed=False)[0]
     rest = f" ({left} pieces would be left)" if left > 1 else ""
-    raise MeshError(f"{found}; {len(pairs)} pairs of nodes coincide within {within} mm: give merge_nodes = \"{within} mm"
-                    f"\", or mend the file with skfsink mesh {path} OUT.vtu --merge-nodes {within}mm{rest}")
+    raise MeshError(f"{found}; {len(pairs)} pairs of nodes coincide within {within} mm: give merge_nodes = "
+                    f"\"{within} mm\", or mend the file with skfsink mesh {path} OUT.vtu --merge-nodes "
+                    f"{within}mm{rest}")
 
 
 def hinges(space: Space) -> np.ndarray:

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import meshio
 import numpy as np
 
-__all__ = ["add_note", "body_blocks", "drop_cells", "notes_of", "place", "renumber", "tidied",
+__all__ = ["add_note", "body_blocks", "drop_cells", "drop_empty", "notes_of", "place", "renumber", "tidied",
            "without_middle_nodes", "without_orphans"]
 
 #: nodes at the corners of a cell; those of a cell of higher order come first in all formats that meshio reads
@@ -112,6 +112,15 @@ def drop_cells(mesh: meshio.Mesh, number: int, keep: np.ndarray) -> None:
                 del mesh.cell_sets[name]
     for data in mesh.cell_data.values():
         data[number] = np.asarray(data[number])[keep]
+
+
+def drop_empty(mesh: meshio.Mesh) -> None:
+    """Drop blocks without cells."""
+    kept = [i for i, block in enumerate(mesh.cells) if len(block.data)]
+    mesh.cells = [mesh.cells[i] for i in kept]
+    mesh.cell_sets = {name: [members[i] if i < len(members) else None for i in kept]
+                      for name, members in mesh.cell_sets.items()}
+    mesh.cell_data = {name: [data[i] for i in kept] for name, data in mesh.cell_data.items()}
 
 
 def place(point: Sequence[float] | np.ndarray) -> str:
