@@ -69,7 +69,7 @@ class Text:
 
     def records(self, n: int, ints: int, reals: int) -> tuple[np.ndarray, np.ndarray]:
         """The next `n` rows of numbers of which the first are whole: these (n, ints), and the others (n, reals)."""
-        rows = self.take(n * (ints + reals)).reshape(n, -1)
+        rows = self.take(n * (ints + reals)).reshape(n, ints + reals)
         return whole(rows[:, :ints]), rows[:, ints:].astype(float)
 
     @property
