@@ -71,7 +71,8 @@ def make(path: Path, dim: int, form: str = "41", *, options: dict[str, float] | 
             mesh.setTransfiniteSurface(tag)
             mesh.setRecombine(2, tag)
         if periodic:
-            ends = [found(dim - 1, lambda a, b, c, d, e, f, x=x: max(a - x, x - d) < 1e-3 and d - a < 1) for x in (0, 4)]
+            ends = [found(dim - 1, lambda a, b, c, d, e, f, x=x: abs(a + d - 2 * x) < 1e-3 and d - a < 1)
+                    for x in (0, 4)]
             mesh.setPeriodic(dim - 1, ends[1], ends[0], [1, 0, 0, 4, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1])
         if sets != ELEMENTARY:
             low = found(dim - 1, lambda a, b, c, d, e, f: e < 1e-3)
@@ -149,5 +150,5 @@ def sets_of(kind: str, form: str) -> str:
 if __name__ == "__main__":
     FOLDER.mkdir(parents=True, exist_ok=True)
     for kind_, form_, dim_ in itertools.product(KINDS, FORMS, (2, 3)):
-        if (dim_ == 2 or kind_ in ("plain", "elementary", "save-all")) and form_ != "40" or kind_ == "parts":
+        if ((dim_ == 2 or kind_ in ("plain", "elementary", "save-all")) and form_ != "40") or kind_ == "parts":
             make(FOLDER / f"{kind_}-{dim_}d-{form_}.msh", dim_, form_, **KINDS[kind_])

@@ -14,6 +14,7 @@ import numpy as np
 
 from .msh import DIMENSION, NODES, SHAPE, Block, Msh, read_msh
 from .sets import join_boundaries
+from .unreadable import Unreadable
 
 __all__ = ["read_gmsh"]
 
@@ -38,14 +39,14 @@ def read_gmsh(path: Path) -> meshio.Mesh:
 
     Raises
     ------
-    ValueError
+    Unreadable
         As of :func:`.msh.read_msh`; or there is nothing that could be a body.
     """
     msh, notes = read_msh(path.read_bytes()), list[str]()
     blocks = _by_kind(msh, notes)
     body = max((DIMENSION[block.kind] for block in blocks), default=0)
     if body < 2:
-        raise ValueError("it has no elements but lines and points: where there are physical groups, gmsh saves "
+        raise Unreadable("it has no elements but lines and points: where there are physical groups, gmsh saves "
                          "nothing else; make one of the surface or volume as well, or set Mesh.SaveAll = 1")
     if body < 3 and msh.solids:
         notes.append("the model has a volume of which no element was saved: the surfaces are taken for a plane body; "
@@ -71,7 +72,7 @@ def _by_kind(msh: Msh, notes: list[str]) -> list[Block]:
     order = np.argsort(msh.tags, kind="stable")
     tags = msh.tags[order]
     if (tags[1:] == tags[:-1]).any():
-        raise ValueError(f"it has the node {tags[1:][tags[1:] == tags[:-1]][0]} twice")
+        raise Unreadable(f"it has the node {tags[1:][tags[1:] == tags[:-1]][0]} twice")
     kinds: dict[int, list[Block]] = {}
     reduced = 0
     for block in msh.blocks:
@@ -81,7 +82,7 @@ def _by_kind(msh: Msh, notes: list[str]) -> list[Block]:
             nodes, reduced = nodes[:, :NODES[kind]], reduced + len(nodes)
         place = np.searchsorted(tags, nodes)
         if nodes.size and (not len(tags) or (tags[np.minimum(place, len(tags) - 1)] != nodes).any()):
-            raise ValueError("it has elements with nodes that do not exist")
+            raise Unreadable("it has elements with nodes that do not exist")
         kinds.setdefault(kind, []).append(Block(kind, order[place], block.groups, block.entities))
     if reduced:
         notes.append(f"{reduced} elements of order 3 or more are taken by their corners")

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from .numbers import Binary, Text
+from .unreadable import Unreadable
 
 __all__ = ["DIMENSION", "NODES", "Block", "Msh", "read_msh"]
 
@@ -95,13 +96,13 @@ def read_msh(data: bytes) -> Msh:
 
     Raises
     ------
-    ValueError
+    Unreadable
         Something that is not of the format, an element of a kind that is unknown, or a part of a partitioned mesh.
     """
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         data = data.decode("utf-16").encode()
     if re.match(rb"\s*\$(NOD|NOE)\b", data):
-        raise ValueError("it is in the format MSH 1; save it with gmsh as MSH 4.1 or 2.2")
+        raise Unreadable("it is in the format MSH 1; save it with gmsh as MSH 4.1 or 2.2")
     version, order, size = _head(data)
     sections = _sections(data)
     msh = Msh(names=_names(sections.get("PhysicalNames", b"")))
@@ -123,7 +124,7 @@ def read_msh(data: bytes) -> Msh:
     parametric = "ParametricNodes" in sections and "Nodes" not in sections
     for name in ("ParametricNodes" if parametric else "Nodes", "Elements"):
         if name not in sections:
-            raise ValueError(f"it has no section ${name}")
+            raise Unreadable(f"it has no section ${name}")
         content, count = sections[name], 0
         if version < 4:  # the number of nodes or elements is a line of text in any case
             line, _, content = content.partition(b"\n")
@@ -144,12 +145,12 @@ def _head(data: bytes) -> tuple[float, str, int]:
     found = re.match(rb"(?:\xef\xbb\xbf)?\s*(?:\$Comments\b.*?\$EndComments\s*)?"
                      rb"\$MeshFormat\s+([\d.]+)[ \t]+([01])[ \t]+(\d+)[ \t]*\r?\n", data, re.S)
     if found is None:
-        raise ValueError("it does not begin with $MeshFormat and a line like 4.1 0 8; save it with gmsh as MSH 4.1")
+        raise Unreadable("it does not begin with $MeshFormat and a line like 4.1 0 8; save it with gmsh as MSH 4.1")
     version, size, one = float(found[1]), int(found[3]), data[found.end():found.end() + 4]
     if version not in (2.0, 2.1, 2.2, 4.0, 4.1):
-        raise ValueError(f"it is in the format MSH {version:g}; save it with gmsh as MSH 4.1 or 2.2")
+        raise Unreadable(f"it is in the format MSH {version:g}; save it with gmsh as MSH 4.1 or 2.2")
     if size not in (4, 8) or (found[2] == b"1" and one not in (b"\0\0\0\1", b"\1\0\0\0")):
-        raise ValueError("its numbers are stored in an unknown way; save it with gmsh as MSH 4.1")
+        raise Unreadable("its numbers are stored in an unknown way; save it with gmsh as MSH 4.1")
     return version, "" if found[2] == b"0" else ">" if one == b"\0\0\0\1" else "<", size
 
 
@@ -161,15 +162,15 @@ def _sections(data: bytes) -> dict[str, bytes]:
         title = re.compile(rb"\s*\$(\w{1,40})[ \t]*(?:\r?\n|$)").match(data, at)
         if title is None:
             if data[at:].strip():
-                raise ValueError("it has something between its sections, or is cut off")
+                raise Unreadable("it has something between its sections, or is cut off")
             break
         name = title[1].decode()
         end = data.find(b"$End" + title[1], title.end())
         if end < 0:
-            raise ValueError(f"its section ${name} has no end; the file is cut off")
+            raise Unreadable(f"its section ${name} has no end; the file is cut off")
         if name in _READ:
             if name in found:
-                raise ValueError(f"its section ${name} is there twice")
+                raise Unreadable(f"its section ${name} is there twice")
             found[name] = data[title.end():end]
         at = end + 4 + len(name)
     return found
@@ -185,7 +186,7 @@ def _names(text: bytes) -> dict[tuple[int, int], str]:
         if line.strip():
             found = re.fullmatch(rb'\s*(\d)\s+(-?\d+)\s+"(.*)"\s*', line)
             if found is None:
-                raise ValueError("its section $PhysicalNames has a line without dimension, number and name")
+                raise Unreadable("its section $PhysicalNames has a line without dimension, number and name")
             try:
                 name = found[3].decode()
             except UnicodeDecodeError:
@@ -227,7 +228,7 @@ def _nodes_4(numbers: Any, version: float) -> tuple[np.ndarray, np.ndarray]:
         n = int(numbers.sizes(1)[0])
         columns = 3 + (dim if parametric else 0)
         if not 0 <= dim <= 3:
-            raise ValueError(f"{numbers.where} has nodes of an entity of dimension {dim}")
+            raise Unreadable(f"{numbers.where} has nodes of an entity of dimension {dim}")
         if version > 4:
             tags.append(numbers.sizes(n))
             points.append(numbers.reals(n * columns).reshape(n, columns)[:, :3])
@@ -253,7 +254,7 @@ def _elements_4(numbers: Any, version: float, entities: dict[tuple[int, int], _E
         width = 1 + _nodes_of(kind)
         nodes = (numbers.sizes if version > 4 else numbers.ints)(n * width).reshape(n, width)[:, 1:]
         entity, every = entities.get((dim, tag), _Entity((), tag)), np.arange(n)
-        blocks.append(Block(kind, nodes, {group: every for group in entity.groups},
+        blocks.append(Block(kind, nodes, dict.fromkeys(entity.groups, every),
                             {entity.tag: every} if entity.tag else {}, entity.parts))
     _agree(sum(len(block.nodes) for block in blocks), total, numbers)
     return blocks
@@ -285,8 +286,8 @@ def _elements_2(numbers: Any, count: int) -> list[Block]:
         there[:, :min(2, tags.shape[1])] = np.abs(tags[:, :2])
         runs.setdefault(kind, []).append((nodes, *there.T))
         parts.setdefault(kind, set()).update(np.unique(tags[:, 3:4]).tolist())  # its own one; others are ghosts there
-    return [_block_2(kind, *(np.concatenate(arrays) for arrays in zip(*found)), frozenset(parts[kind]))
-            for kind, found in runs.items()]
+    return [_block_2(kind, np.concatenate([run[0] for run in found]), np.concatenate([run[1] for run in found]),
+                     np.concatenate([run[2] for run in found]), frozenset(parts[kind])) for kind, found in runs.items()]
 
 
 def _runs_of_text(numbers: Text, count: int) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
@@ -313,7 +314,7 @@ def _runs_of_bytes(numbers: Binary, count: int) -> Iterator[tuple[int, np.ndarra
         kind, n, n_tags = numbers.ints(3).tolist()
         width = 1 + _number_of_tags(n_tags, numbers) + _nodes_of(kind)
         if not 0 < n <= count:
-            raise ValueError(f"{numbers.where} has another number of elements than it says")
+            raise Unreadable(f"{numbers.where} has another number of elements than it says")
         rows = numbers.ints(n * width).reshape(n, width)
         count -= n
         yield kind, rows[:, 1:1 + n_tags], rows[:, 1 + n_tags:]
@@ -345,28 +346,28 @@ def _members(tags: np.ndarray, place: np.ndarray) -> dict[int, np.ndarray]:
 # --- what both have ---
 def _nodes_of(kind: int) -> int:
     if kind not in NODES:
-        raise ValueError(f"it has elements of gmsh's kind {kind}, which cannot be read; "
+        raise Unreadable(f"it has elements of gmsh's kind {kind}, which cannot be read; "
                          "save lines, quadrilaterals and hexahedra only")
     return NODES[kind]
 
 
 def _number_of_tags(n: int, numbers: Any) -> int:
     if not 0 <= n <= 10**6:
-        raise ValueError(f"{numbers.where} has an element with {n} tags")
+        raise Unreadable(f"{numbers.where} has an element with {n} tags")
     return n
 
 
 def _agree(found: int, said: int, numbers: Any) -> None:
     if found != said:
-        raise ValueError(f"{numbers.where} says that it has {said} entries, and has {found}")
+        raise Unreadable(f"{numbers.where} says that it has {said} entries, and has {found}")
 
 
 def _see_that_all_is_there(msh: Msh, partitions: int) -> None:
-    """Raise a ValueError where elements of a partitioned mesh are in another file."""
+    """Raise Unreadable where elements of a partitioned mesh are in another file."""
     body = max((DIMENSION[block.kind] for block in msh.blocks), default=0)
     blocks = [block for block in msh.blocks if DIMENSION[block.kind] == body and len(block.nodes)]
     found = set().union(*(block.parts for block in blocks))
     missing = set(range(1, min(max([partitions, *found]), 10**6) + 1)) - found
     if found and (missing or found == {1}):
-        raise ValueError(f"it holds part {', '.join(map(str, sorted(found)))} of a partitioned mesh, and other files "
+        raise Unreadable(f"it holds part {', '.join(map(str, sorted(found)))} of a partitioned mesh, and other files "
                          "the rest; save it into one file, with Mesh.PartitionSplitMeshFiles = 0")

@@ -6,6 +6,8 @@ import warnings
 
 import numpy as np
 
+from .unreadable import Unreadable
+
 __all__ = ["Binary", "Text", "whole"]
 
 
@@ -14,14 +16,14 @@ def whole(values: np.ndarray) -> np.ndarray:
 
     Raises
     ------
-    ValueError
+    Unreadable
         One is not whole, or has more than 53 bits.
     """
     if values.dtype.kind == "f":
         if not (np.abs(values) < 2.0**53).all() or (values != np.floor(values)).any():
-            raise ValueError("a number in it must be whole and is not")
+            raise Unreadable("a number in it must be whole and is not")
     elif values.dtype.kind == "u" and values.size and values.max() >= 2**63:
-        raise ValueError("a number in it is too large")
+        raise Unreadable("a number in it is too large")
     return values.astype(np.int64)
 
 
@@ -36,7 +38,7 @@ class Text:
 
     Raises
     ------
-    ValueError
+    Unreadable
         There is something else between the numbers.
     """
 
@@ -47,12 +49,12 @@ class Text:
             try:
                 self.values = np.fromstring(text, float if real else np.int64, sep=" ")  # type: ignore[call-overload]
             except (DeprecationWarning, ValueError):
-                raise ValueError(f"{where} has something between its numbers that is none") from None
+                raise Unreadable(f"{where} has something between its numbers that is none") from None
 
     def take(self, n: int) -> np.ndarray:
         """The next `n` numbers."""
         if not 0 <= n <= len(self.values) - self.at:
-            raise ValueError(f"{self.where} has fewer numbers than it says")
+            raise Unreadable(f"{self.where} has fewer numbers than it says")
         self.at += n
         found: np.ndarray = self.values[self.at - n:self.at]
         return found
@@ -86,7 +88,7 @@ class Text:
     def end(self) -> None:
         """See that all was read."""
         if self.at < len(self.values):
-            raise ValueError(f"{self.where} has more numbers than it says")
+            raise Unreadable(f"{self.where} has more numbers than it says")
 
 
 class Binary:
@@ -107,7 +109,7 @@ class Binary:
         """The next `n` values of a type."""
         dtype = np.dtype(kind)
         if not 0 <= n <= (len(self.data) - self.at) // dtype.itemsize:
-            raise ValueError(f"{self.where} has fewer numbers than it says")
+            raise Unreadable(f"{self.where} has fewer numbers than it says")
         found = np.frombuffer(self.data, dtype, n, self.at)
         self.at += n * dtype.itemsize
         return found
@@ -132,4 +134,4 @@ class Binary:
     def end(self) -> None:
         """See that all was read."""
         if self.data[self.at:].strip():
-            raise ValueError(f"{self.where} has more numbers than it says")
+            raise Unreadable(f"{self.where} has more numbers than it says")

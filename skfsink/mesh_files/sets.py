@@ -1,8 +1,8 @@
 """Arrays of whole numbers on cells and points, read as regions and boundaries.
 
 An array `boundary:NAME` marks the set NAME with values other than 0. Any other array of whole numbers `NAME` gives a
-set `NAME:1`, `NAME:2`, ... for each of its values; if these are 0 and 1 only, it also is the set NAME. On elements these
-are regions; on edges, faces, vertices and points they are boundaries.
+set `NAME:1`, `NAME:2`, ... for each of its values; if these are 0 and 1 only, it also is the set NAME. On elements
+these are regions; on edges, faces, vertices and points they are boundaries.
 """
 
 from __future__ import annotations
@@ -11,6 +11,8 @@ from collections.abc import Iterator
 
 import meshio
 import numpy as np
+
+from .unreadable import Unreadable
 
 __all__ = ["BOUNDARY_PREFIX", "join_boundaries", "named_sets"]
 
@@ -30,7 +32,7 @@ def named_sets(mesh: meshio.Mesh) -> meshio.Mesh:
     nodes: dict[str, list[np.ndarray]] = {}
     for key, values in list(mesh.cell_data.items()):
         if any(len(part) != len(block.data) for part, block in zip(values, mesh.cells, strict=True)):
-            raise ValueError("it has values on cells, but not as many as cells")
+            raise Unreadable("it has values on cells, but not as many as cells")
         whole = np.concatenate([np.asarray(part).reshape(len(part), -1) for part in values]) if values else np.zeros(0)
         for name, mask in _masks(key, whole):
             members = [np.flatnonzero(part) for part in np.split(mask, starts)]
@@ -43,7 +45,7 @@ def named_sets(mesh: meshio.Mesh) -> meshio.Mesh:
             del mesh.cell_data[key]
     for key, values in mesh.point_data.items():
         if len(values) != len(mesh.points):
-            raise ValueError("it has values on points, but not as many as points")
+            raise Unreadable("it has values on points, but not as many as points")
         for name, mask in _masks(key, np.asarray(values).reshape(len(values), -1)):
             nodes.setdefault(name, []).append(np.flatnonzero(mask))
     for name, parts in nodes.items():
