@@ -105,9 +105,9 @@ def check(sample: Sample, sets: str = NAMED, height: float = 0.0) -> None:
     space = sample.space
     X, dim = space.X, space.dim
     planes = [np.arange(5.0), np.arange(3.0), np.arange(2.0)][:dim]
-    assert _points(X) == set(itertools.product(*planes))
+    assert points_of(X) == set(itertools.product(*planes))
     middle = X[space.conn].mean(axis=1)
-    assert _points(middle) == set(itertools.product(*[(plane[1:] + plane[:-1]) / 2 for plane in planes]))
+    assert points_of(middle) == set(itertools.product(*[(plane[1:] + plane[:-1]) / 2 for plane in planes]))
     assert np.allclose(space.V, 1) and len(middle) == 8
     elements, nodes = {"soft": middle[:, 0] < 2, "lid": middle[:, 0] > 2, "whole": middle[:, 0] > 0}, {
         "the bottom": X[:, 1] == 0, "lid": np.isclose(X[:, 1], 2), "seam": np.isclose(X[:, 0], 2),
@@ -137,7 +137,8 @@ def check(sample: Sample, sets: str = NAMED, height: float = 0.0) -> None:
         name: set(np.flatnonzero(mask).tolist()) for name, mask in nodes.items()}
 
 
-def _points(X: np.ndarray) -> set[tuple[float, ...]]:
+def points_of(X: np.ndarray) -> set[tuple[float, ...]]:
+    """Rows of coordinates (n, dim), as a set."""
     return set(map(tuple, (np.round(X, 9) + 0.0).tolist()))
 
 

@@ -62,7 +62,7 @@ def _mirrored(points: np.ndarray, cells: np.ndarray, kind: str) -> np.ndarray:
 def _folded(cells: np.ndarray, kind: str) -> bool:
     """Whether two elements lie on the same side of a facet that they share."""
     facets = np.concatenate([cells[:, corners] for corners in FACETS[kind]])
-    n = facets.shape[1]
-    first = facets.argmin(axis=1)
-    facets = facets[np.arange(len(facets))[:, None], (first[:, None] + np.arange(n)) % n]  # least node first
+    if (n := facets.shape[1]) > 2:  # a face may begin at any node; an edge has its sense in its order
+        first = facets.argmin(axis=1)
+        facets = facets[np.arange(len(facets))[:, None], (first[:, None] + np.arange(n)) % n]  # least node first
     return len(np.unique(facets, axis=0)) < len(facets)

@@ -24,34 +24,44 @@ DIMENSION = {"vertex": 0, "line": 1, "line3": 1, "triangle": 2, "triangle6": 2, 
 def named_sets(mesh: meshio.Mesh) -> meshio.Mesh:
     """Add the sets that the arrays of a mesh stand for; sets that it has keep their members.
 
-    Cell sets are of elements and their facets, by block; sets of nodes are those of points and of cells of lower
-    dimension.
+    Cell sets are of elements and their facets, by block; sets of nodes are those of cells of lower dimension and of
+    points. Numbers may be given anew in each dimension: where facets have one, edges and points of it are left out.
+
+    Raises
+    ------
+    Unreadable
+        An array has not as many values as there are cells or points.
     """
     dims, body = _dimensions(mesh)
     starts = np.cumsum([0, *(len(block.data) for block in mesh.cells)])[1:-1]
     nodes: dict[str, list[np.ndarray]] = {}
+    facets = set()
     for key, values in list(mesh.cell_data.items()):
         if any(len(part) != len(block.data) for part, block in zip(values, mesh.cells, strict=True)):
-            raise Unreadable("it has values on cells, but not as many as cells")
-        whole = np.concatenate([np.asarray(part).reshape(len(part), -1) for part in values]) if values else np.zeros(0)
-        for name, mask in _masks(key, whole):
+            raise Unreadable(f"its data {key} are not as many as its cells")
+        own = key.startswith(BOUNDARY_PREFIX)
+        joined = np.concatenate([np.asarray(part).reshape(len(part), -1) for part in values]) if values else np.zeros(0)
+        for name, mask in _masks(key, joined):
             members = [np.flatnonzero(part) for part in np.split(mask, starts)]
-            nodes.setdefault(name, []).extend(block.data[index].ravel() for block, dim, index
-                                              in zip(mesh.cells, dims, members) if dim < body - 1)
+            lower = [block.data[index].ravel() for block, dim, index in zip(mesh.cells, dims, members)
+                     if dim < body - 1 and len(index)]
+            if any(len(index) for dim, index in zip(dims, members) if dim == body - 1):
+                facets.add(name)
+            if lower and (own or name not in facets):
+                nodes.setdefault(name, []).extend(lower)
             members = [index if dim >= body - 1 else index[:0] for dim, index in zip(dims, members)]
-            if any(len(index) for index in members) or key.startswith(BOUNDARY_PREFIX):
+            if any(len(index) for index in members) or (own and not lower):
                 mesh.cell_sets.setdefault(name, members)
-        if key.startswith(BOUNDARY_PREFIX):
+        if own:
             del mesh.cell_data[key]
     for key, values in mesh.point_data.items():
         if len(values) != len(mesh.points):
-            raise Unreadable("it has values on points, but not as many as points")
+            raise Unreadable(f"its data {key} are not as many as its points")
         for name, mask in _masks(key, np.asarray(values).reshape(len(values), -1)):
-            nodes.setdefault(name, []).append(np.flatnonzero(mask))
+            if key.startswith(BOUNDARY_PREFIX) or (name not in nodes and name not in facets):
+                nodes.setdefault(name, []).append(np.flatnonzero(mask))
     for name, parts in nodes.items():
-        found = np.unique(np.concatenate([np.zeros(0, np.int64), *parts]))
-        if len(found):
-            mesh.point_sets.setdefault(name, found)
+        mesh.point_sets.setdefault(name, np.unique(np.concatenate(parts)).astype(np.int64))
     return join_boundaries(mesh)
 
 

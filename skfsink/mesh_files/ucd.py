@@ -19,8 +19,8 @@ __all__ = ["is_ucd", "read_ucd"]
 
 #: name of the block and nodes in its order; the top of a hexahedron comes first in UCD
 KINDS = {"pt": ("vertex", [0]), "line": ("line", [0, 1]), "tri": ("triangle", [0, 1, 2]),
-         "quad": ("quad", [0, 1, 2, 3]), "tet": ("tetra", [0, 1, 3, 2]), "pyr": ("pyramid", [1, 2, 3, 4, 0]), "prism": ("wedge", [3, 4, 5, 0, 1, 2]),
-         "hex": ("hexahedron", [4, 5, 6, 7, 0, 1, 2, 3])}
+         "quad": ("quad", [0, 1, 2, 3]), "tet": ("tetra", [0, 1, 3, 2]), "pyr": ("pyramid", [1, 2, 3, 4, 0]),
+         "prism": ("wedge", [3, 4, 5, 0, 1, 2]), "hex": ("hexahedron", [4, 5, 6, 7, 0, 1, 2, 3])}
 
 
 def is_ucd(begin: bytes) -> bool:
