@@ -73,7 +73,7 @@ def load_checkpoint(path: Path, fingerprint: str) -> tuple[State, dict[str, dict
         raise CheckpointError(f"the checkpoint {path} is damaged: {first}") from None
     if version != __version__:
         raise CheckpointError(f"the checkpoint {path} was written by skfsink {version}, this is {__version__}")
-    if found != fingerprint:
+    if found not in (fingerprint, fingerprint.partition("-")[0]):  # the latter is of an earlier version
         raise CheckpointError(f"the checkpoint {path} belongs to another scene than scene.toml beside it")
     memories: dict[str, dict[str, np.ndarray]] = {}
     for key, value in arrays.items():

@@ -15,13 +15,13 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from scipy.sparse import csr_array
 
 from . import kernels
 from .amg import AmgCG
 from .direct import Factorization
 from .errors import ConvergenceError, ParameterError
+from .jit import njit
 from .material import SinkLaw
 from .regions import Region, by_element, check_lengths, rest_of
 from .space import Pattern, Space

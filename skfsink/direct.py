@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse.linalg as sla
-from numba import njit
 from scipy.sparse import csc_array, csr_array
 from threadpoolctl import ThreadpoolController
 
 from .errors import ConvergenceError
+from .jit import njit
 from .pattern import Pattern
 
 os.environ.setdefault("MKL_CBWR", "AUTO,STRICT")  # the same bits from one run to the next, whatever the alignment

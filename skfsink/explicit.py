@@ -23,12 +23,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from .deletion import delete_failed, left_in
 from .density import Density, DensitySolver
 from .errors import InstabilityError, require
 from .frequency import highest_frequency
+from .jit import njit
 from .loading import Loading
 from .momentum import Momentum
 from .space import Pattern

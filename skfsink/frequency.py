@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.linalg as la
-from numba import njit
 
 from .direct import add_symmetric_product
 from .errors import ConvergenceError, InstabilityError
+from .jit import njit
 from .momentum import Momentum
 from .pattern import Pattern
 

@@ -17,11 +17,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from scipy.sparse import csr_array
 
 from .amg import AmgCG, residual
 from .direct import unsigned
+from .jit import njit
 
 __all__ = ["ActiveZone", "Zone"]
 
