@@ -235,7 +235,10 @@ class HHT:
                 momentum.force(u)
                 if not (momentum.least_J > self.LEAST_J and np.isfinite(momentum.energy)):
                     return None, iteration
-                new = self.density.solve(np.maximum(state.W_max, momentum.W), gamma)
+                try:
+                    new = self.density.solve(np.maximum(state.W_max, momentum.W), gamma)
+                except ConvergenceError:  # of a trial that stretches points beyond what the sink can take
+                    return None, iteration
                 last, change = change, float(np.abs(new - gamma).max())
                 settled = change <= c.gamma_tolerance
                 growing = growing + 1 if change > last else 0

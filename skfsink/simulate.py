@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from .checkpoint import load_checkpoint, save_checkpoint, save_state
+from .checks import warn
 from .density import DensitySolver
 from .direct import one_thread_of_openblas
 from .energy import Ledger
@@ -89,6 +90,7 @@ class Simulation:
             self._interrupt = interrupt
             if self.state.phase == "loading":
                 self.recorder.guard.check_scene()
+                warn(self.scene, self.folder)
                 if onset is None:
                     self._load()
                 else:
