@@ -50,13 +50,13 @@ def pieces(space: Space) -> np.ndarray:
 
 
 def free_motions(space: Space, free: np.ndarray) -> Iterator[Motion]:
-    """The rigid motions that are left to the body, or to its pieces, by the mask `free` (n*dim,) of what is not held."""
+    """The rigid motions left to the body, or to its pieces, by the mask `free` (n*dim,) of what is not held."""
     label = pieces(space)
     count, held = int(label.max()) + 1, ~free.reshape(space.X.shape)
     size = float(np.ptp(space.X, axis=0).max())
     centre = space.X.mean(axis=0)
     X = (space.X - centre) / size
-    modes = np.stack([mode for mode in _modes(X)])               # (nm, n, dim)
+    modes = np.stack(list(_modes(X)))  # (nm, n, dim)
     nm = len(modes)
     members = [np.unique(space.conn[label == k]) for k in range(count)]
     stiffness = np.zeros((count * nm, count * nm))
@@ -77,16 +77,17 @@ def free_motions(space: Space, free: np.ndarray) -> Iterator[Motion]:
             yield Motion(_named(space, label, own, count), "move", "", unheld=True)
             continue
         null = vectors[:, values < RESISTED * values[-1]].T.reshape(-1, len(own), nm)
-        for i, k in enumerate(own):
+        for i, piece in enumerate(own):
             moving = null[:, i]
             if len(moving) and np.abs(moving).max() > 1e-6:
                 for name, cure in _names(moving, space.dim, centre, size):
-                    yield Motion(_named(space, label, np.array([k]), count), name, cure, unheld=False)
+                    yield Motion(_named(space, label, np.array([piece]), count), name, cure, unheld=False)
 
 
 def _join(stiffness: np.ndarray, members: list[np.ndarray], modes: np.ndarray) -> csr_array:
     """Make nodes that pieces share move alike; the pieces that do are the entries of the matrix returned."""
-    nm, owner = len(modes), {}
+    nm = len(modes)
+    owner: dict[int, int] = {}
     links = np.zeros((len(members),) * 2)
     for k, nodes in enumerate(members):
         for node in nodes.tolist():

@@ -20,6 +20,7 @@ from .explicit import Explicit
 from .guards import Notes
 from .hht import HHT
 from .momentum import Momentum
+from .places import check_arrival, said
 from .progress import Display, Interrupt
 from .recorder import Recorder
 from .rest import LoadingFromRest
@@ -103,6 +104,7 @@ class Simulation:
                 else:
                     self._integrate()
                 self.state.phase = "done"
+                check_arrival(self.scene, self.recorder.tracker)
             self._lap("event")
             self.checkpoint()
             if interrupt.heeded():
@@ -159,6 +161,7 @@ class Simulation:
             assert self.integrator is not None
             self.integrator.begin(state)
         self.recorder.start(state, reaction)
+        self.display.say(said(self.recorder.onset))
 
     def _make_integrator(self) -> None:
         c, threads = self.scene.controls, self.scene.controls.workers(self.scene.sample.space.dim)
