@@ -15,6 +15,7 @@ from .loading import Loading
 from .material_point import mean_deformation, mean_stress
 from .momentum import Momentum
 from .output import History, Series, prepare_folder, write_atomic
+from .places import beginning, check_beginning, rim_of
 from .scene import Scene
 from .state import State
 from .stress import cauchy_stress, pressure, von_mises
@@ -48,7 +49,7 @@ class Recorder:
         held = [sample.nodes(name) for name in dict.fromkeys(names)]
         # a tip in the slowest material has to have moved between two looks at it
         self.tracker = CrackTracker(space, scene.sink_law.length_scale, momentum.shear_wave_speeds[0], held,
-                                    sample.rim(*scene.faces))
+                                    *rim_of(scene))
         self._cells = {"region": scene.region_numbers} if scene.regions else {}
         if memory is None:
             prepare_folder(folder / "series", overwrite=True)
@@ -62,7 +63,7 @@ class Recorder:
         self.greatest: dict[str, Any] = dict(memory.get("greatest", {}))
         self.frames: list[tuple[float, str]] = [(float(t), str(label)) for t, label in memory["frames"]]
         self.moments: dict[str, int] = dict(memory["moments"])
-        self.onset: dict[str, float] = dict(memory["onset"])
+        self.onset: dict[str, Any] = dict(memory["onset"])
         self.at_arrival: dict[str, float] = dict(memory["at_arrival"])
         self.separated_at = float(memory.get("separated_at", np.inf))   #: first record after the separation [s]
         self.series.resume(len(self.frames))  # this may refuse, before any file is touched
@@ -111,7 +112,8 @@ class Recorder:
         self.onset = {"displacement_mm": self.gauge.displacement(state), "reaction_N_per_mm": self.load(reaction),
                       "elastic_energy": state.ledger.elastic, "gamma_min": float(state.gamma.min()),
                       "sink": state.ledger.sink, "work": state.ledger.work,
-                      "loading_balance": state.ledger.balance}
+                      "loading_balance": state.ledger.balance, **beginning(self.scene, state)}
+        check_beginning(self.scene, state)
         self.guard.scale = state.ledger.elastic
         self.guard.check_onset(state)
         self.onset["evenness"] = self.guard.evenness

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from .checkpoint import load_checkpoint, load_state
+from .checks import refuse
 from .corridor import MESH, corridor_report, has_gmsh, lay_corridor
 from .errors import OutputError, ParameterError
 from .memory import check_memory
@@ -72,11 +73,13 @@ def run_case(case: Callable[..., Result], make_scene: SceneMaker, own: dict[str,
                 there = [place for place in places if place == folder or place.exists()]
                 notes += [locks.enter_context(occupied(place)) for place in there]
                 if not resume:
+                    refuse(scene)
                     _begin(folder, options.overwrite)
                     if options.mesh_layout == "two-pass":
                         options = lay_corridor(scene, own, options, folder, display)
                         scene = replace(make_scene(own, options), choice=choice)
                         check_memory(scene, display)
+                        refuse(scene)
                 notes += [locks.enter_context(occupied(place)) for place in places if place not in there]
                 if options.analysis == "both":
                     return _run_both(scene, folder, display, resume, notes)

@@ -176,6 +176,9 @@ class Scene:
         if self.controls.start == "rest" and (loading.knots or self.tractions):
             raise ParameterError("start rest is for grips of constant velocity; this scene has "
                                  f"{'tractions' if self.tractions else 'ramps'}: take start onset")
+        if self.controls.start == "rest" and loading.speed(0.0) == 0.0:
+            raise ParameterError("start rest needs a grip that moves; all of them are still: give one a velocity, or "
+                                 "take start onset")
 
     @property
     def parts(self) -> tuple[Region, ...]:

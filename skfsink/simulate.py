@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from .checkpoint import load_checkpoint, save_checkpoint, save_state
+from .checks import warn
 from .density import DensitySolver
 from .direct import one_thread_of_openblas
 from .energy import Ledger
@@ -19,6 +20,7 @@ from .explicit import Explicit
 from .guards import Notes
 from .hht import HHT
 from .momentum import Momentum
+from .places import check_arrival, said
 from .progress import Display, Interrupt
 from .recorder import Recorder
 from .rest import LoadingFromRest
@@ -90,6 +92,7 @@ class Simulation:
             self._interrupt = interrupt
             if self.state.phase == "loading":
                 self.recorder.guard.check_scene()
+                warn(self.scene, self.folder)
                 if onset is None:
                     self._load()
                 else:
@@ -106,6 +109,7 @@ class Simulation:
                 else:
                     self._integrate()
                 self.state.phase = "done"
+                check_arrival(self.scene, self.recorder.tracker)
             self._lap("event")
             self.checkpoint()
             if interrupt.heeded():
@@ -174,6 +178,7 @@ class Simulation:
             assert self.integrator is not None
             self.integrator.begin(state)
         self.recorder.start(state, reaction)
+        self.display.say(said(self.recorder.onset))
 
     def _make_integrator(self) -> None:
         c, threads = self.scene.controls, self.scene.controls.workers(self.scene.sample.space.dim)
