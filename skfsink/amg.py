@@ -8,10 +8,10 @@ from collections.abc import Callable
 import numpy as np
 import pyamg
 import scipy.sparse.linalg as sla
-from numba import njit
 from scipy.sparse import csc_array, csr_array
 
 from .direct import unsigned
+from .jit import njit
 
 __all__ = ["AmgCG", "residual"]
 

@@ -15,14 +15,17 @@ mean speed   crack length gained between its first passing l and the first arriv
 first arrival  a connected piece of the cracked set touches the rim of the sample at two places, more than 3 l apart:
              the crack has reached an edge, a grip or another notch, or has met the crack that came from there. The
              rim is the outer boundary, in three dimensions without the surfaces along which a crack runs; a place is
-             a set of cracked nodes of the rim joined by edges of elements along it.
+             a set of cracked nodes of the rim joined by edges of elements along it. A plane of symmetry is no part of
+             the rim: there the body goes on as its image, and a piece that touches the plane has the images of its
+             places too.
 separation   no path of uncracked nodes joins two grips.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -31,7 +34,7 @@ from scipy.spatial.distance import cdist
 
 from .space import Space
 
-__all__ = ["CRACKED", "CrackTracker", "Tips"]
+__all__ = ["CRACKED", "CrackTracker", "Plane", "Tips"]
 
 CRACKED = 0.1
 
@@ -55,6 +58,13 @@ class Tips:
     points: np.ndarray
 
 
+class Plane(NamedTuple):
+    """A plane of symmetry: the axis that is normal to it, and its nodes."""
+
+    axis: int
+    nodes: np.ndarray
+
+
 class CrackTracker:
     """Follows the crack through the nodal density, one call a record.
 
@@ -64,13 +74,14 @@ class CrackTracker:
     length_scale: l [mm].   shear_wave_speed: c_s [m/s].
     grips: node numbers of each grip.
     rim: node numbers of the rim.
+    planes: of symmetry.
     """
 
     def __init__(self, space: Space, length_scale: float, shear_wave_speed: float, grips: list[np.ndarray],
-                 rim: np.ndarray) -> None:
+                 rim: np.ndarray, planes: Sequence[Plane] = ()) -> None:
         self.space, self.l = space, length_scale
         self._transit = length_scale / (shear_wave_speed * 1e3)   # l/c_s [s]
-        self._grips, self._rim = grips, rim
+        self._grips, self._rim, self._planes = grips, rim, planes
         rows = np.repeat(np.arange(space.n_nodes), np.diff(space.graph.indptr))
         lengths = np.linalg.norm(space.X[rows] - space.X[space.graph.indices], axis=1)
         self._graph = csr_array((np.maximum(lengths, 1e-12), space.graph.indices, space.graph.indptr),
@@ -99,7 +110,7 @@ class CrackTracker:
         """Whether a piece of the cracked set joins two places of the rim."""
         rim = self._rim[np.isfinite(self.cracked_at[self._rim])]
         count, place = connected_components(self._graph[rim][:, rim], directed=False)
-        if count < 2:
+        if count < 2 - bool(self._planes):
             return False
         nodes = np.flatnonzero(np.isfinite(self.cracked_at))
         _, label = connected_components(self._graph[nodes][:, nodes], directed=False)
@@ -109,7 +120,17 @@ class CrackTracker:
             rivals = (place < k) & (piece == piece[here][0])
             if rivals.any() and cdist(X[here], X[rivals]).min() > 3 * self.l:
                 return True
-        return False
+        return any(self._meets_its_image(plane, rim, place, piece, nodes, label) for plane in self._planes)
+
+    def _meets_its_image(self, plane: Plane, rim: np.ndarray, place: np.ndarray, piece: np.ndarray, nodes: np.ndarray,
+                         label: np.ndarray) -> bool:
+        """Whether a piece of the cracked set (`label` of its `nodes`) joins a place of the rim to the image of it."""
+        touching = np.unique(label[np.isin(nodes, plane.nodes)])
+        height = np.abs(self.space.X[rim, plane.axis] - self.space.X[plane.nodes[0], plane.axis])
+        height[np.isin(rim, plane.nodes)] = 0.0
+        lowest = np.full(int(place.max(initial=-1)) + 1, np.inf)
+        np.minimum.at(lowest, place, height)
+        return bool((np.isin(piece, touching) & (2 * lowest[place] > 3 * self.l)).any())
 
     # --- every record ---
     def look(self, time: float, gamma: np.ndarray) -> Tips:

@@ -23,16 +23,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from .deletion import delete_failed, left_in
-from .density import DensitySolver
+from .density import Density, DensitySolver
 from .errors import InstabilityError, require
 from .frequency import highest_frequency
+from .jit import njit
 from .loading import Loading
 from .momentum import Momentum
 from .space import Pattern
 from .state import State
+from .zone import Zone
 
 __all__ = ["Explicit", "ExplicitControls"]
 
@@ -109,6 +110,7 @@ class Explicit:
         self._last_estimate = 0
         self._urgent = False
         self._since_gamma = 0
+        self._zones: tuple[Zone, ...] = ()
 
     def start(self, state: State) -> None:
         """Forces, masses and accelerations of `state`; to be called once before stepping, and after a resume."""
@@ -183,8 +185,11 @@ class Explicit:
             self._since_gamma = 0
             self.update_density(state)
         if state.step % 100 == 0 and not np.isfinite(kinetic + elastic):
-            raise InstabilityError(f"the explicit integration blew up at t = {state.time:.4g} s (step {state.step}): "
-                                   f"lower courant, now {self.controls.courant:g}")
+            self._blow_up(state)
+
+    def _blow_up(self, state: State) -> None:
+        raise InstabilityError(f"the explicit integration blew up at t = {state.time:.4g} s (step {state.step}): "
+                               f"lower courant, now {self.controls.courant:g}")
 
     def _turn(self, state: State) -> None:
         """At a knot: grips take their new velocities at once; what that needs is their work."""
@@ -198,13 +203,16 @@ class Explicit:
         """Solve for gamma from the history, book what the sink takes, delete failed elements."""
         momentum, ledger = self.momentum, state.ledger
         self.sync(state)
-        solves = self.density.solves
-        state.gamma = self.density.solve(state.W_max, state.gamma, self.GAMMA_TOLERANCE)
-        if self.density.solves == solves:
+        if not np.isfinite(state.W_max.max()):
+            self._blow_up(state)
+        before = Density(state.gamma, state.sink, self._zones)
+        now = self.density.update(state.W_max, before, self.GAMMA_TOLERANCE)
+        if now is before:
             return
+        state.gamma, state.sink, self._zones = now
         failed = delete_failed(self.space, state, self.deletion, self.density.failure_energy)
         left = left_in(momentum, state.gamma, failed) if failed.size else 0.0
-        dead, before = momentum.dead, None if momentum.dead is None else momentum.dead.values
+        dead, loads = momentum.dead, None if momentum.dead is None else momentum.dead.values
         stored = momentum.set_gamma(state.gamma, state.deleted)
         mass = self.mass
         self._set_mass()
@@ -212,8 +220,8 @@ class Explicit:
         ledger.deletion += left
         half_v2 = _half_square(state.v)
         ledger.sink_kinetic += float((mass - self.mass) @ half_v2)
-        if dead is not None and before is not None:
-            ledger.work += dead.changed(before, state.u)
+        if dead is not None and loads is not None:
+            ledger.work += dead.changed(loads, state.u)
             ledger.loads = dead.potential(state.u)
         self._elastic -= stored
         ledger.elastic = self._elastic
@@ -253,6 +261,11 @@ class Explicit:
         if not c.gamma_every:
             self.dt = min(self.dt, self._interval)  # in plane stress the stable step may be longer
 
+    def step_share(self, state: State) -> float:
+        """The step over the stability limit of `state` as it is now; nothing is changed."""
+        omega, _ = highest_frequency(self.momentum, self._pattern, self.free, state.u, self.mass, self._mode)
+        return 0.5 * self.dt * max(omega, self._indicator(state.u) ** 0.5)
+
     def _indicator(self, u: np.ndarray) -> float:
         """A lower bound of omega_max^2 that follows it closely; see :meth:`.Momentum.stiffest`."""
         return self.momentum.stiffest(u, self._inverse)
@@ -263,7 +276,8 @@ class Explicit:
         assert self._mode is not None
         scalars = [self.dt, self._omega, self._indicator0, self._last_estimate, self.estimates, self._elastic,
                    self._urgent, self._since_gamma]
-        return {"mode": self._mode, "scalars": np.array(scalars, float), "reaction": self.reaction}
+        depths = {"zone_depths": np.array([zone.depth for zone in self._zones])} if self._zones else {}
+        return {"mode": self._mode, "scalars": np.array(scalars, float), "reaction": self.reaction, **depths}
 
     def restore(self, state: State, memory: dict[str, np.ndarray]) -> None:
         """Go on exactly where :meth:`memory` was taken."""
@@ -274,6 +288,8 @@ class Explicit:
         self._last_estimate, self.estimates = int(scalars[3]), int(scalars[4])
         self._urgent, self._since_gamma = bool(scalars[6]), int(scalars[7])
         self.reaction = memory["reaction"]
+        if self.density.zone is not None:
+            self._zones = tuple(self.density.zone.of_depth(depth) for depth in memory.get("zone_depths", ()))
 
 
 def _half_square(v: np.ndarray) -> np.ndarray:

@@ -19,6 +19,7 @@ import numpy as np
 import psutil
 
 from .errors import MeshError, SkfsinkError
+from .mesh_files.orientation import oriented
 from .mesh_files.tidy import tidied
 from .meshing import read_mesh
 
@@ -83,9 +84,10 @@ def read_mesh_file(path: Path, raw: bool = False) -> meshio.Mesh:
         mesh = quietly(lambda: read_mesh(path), failure)
         quietly(lambda: _sound(mesh), failure)
     check_indices(shown, mesh)
-    if not raw:
-        check_mesh(shown, tidied(mesh))
-    return mesh
+    if raw:
+        return mesh
+    check_mesh(shown, tidied(mesh))
+    return oriented(mesh)
 
 
 def check_mesh(name: str, mesh: meshio.Mesh) -> None:
@@ -143,10 +145,6 @@ def _sound(mesh: meshio.Mesh) -> meshio.Mesh:
     if points.ndim != 2 or not 2 <= points.shape[1] <= 3:
         raise ValueError("its points are not given by two or three coordinates")
     mesh.points = np.column_stack([points, np.zeros((len(points), 3 - points.shape[1]))])
-    physical = mesh.cell_data.get("gmsh:physical", [])
-    for name, (tag, dim) in mesh.field_data.items() if physical else ():  # older formats of gmsh make no sets of these
-        mesh.cell_sets.setdefault(name, [np.flatnonzero(np.equal(tags, tag) & (block.dim == dim))
-                                         for tags, block in zip(physical, mesh.cells)])
     mesh.point_sets = {name: np.asarray(nodes, np.int64).ravel() for name, nodes in mesh.point_sets.items()}
     for members in mesh.cell_sets.values():
         members[:] = [None if index is None else np.asarray(index, np.int64).ravel() for index in members]

@@ -23,6 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import MeshError, MissingExtra, require
+from .mesh_files.formats import read_format
+from .mesh_files.sets import BOUNDARY_PREFIX
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -30,7 +32,6 @@ Box = tuple[float, float, float, float]  # x0, x1, y0, y1 of a rectangle of fine
 Band = tuple[float, float, float, float, float]  # x0, y0, x1, y1 of a line, and the distance from it
 Distance = Callable[[float, float], float]
 
-BOUNDARY_PREFIX = "boundary:"
 RIPPLE = 0.08  # root mean square of the relative ripple of the element size
 RIPPLE_LENGTH = 15  # its wavelength in fine element sizes
 TYPICAL_SCALE = 1.155  # triangles of 1.155 h make quadrilaterals of size h
@@ -145,14 +146,8 @@ def write_mesh(path: str | Path, mesh: meshio.Mesh) -> None:
 
 
 def read_mesh(path: str | Path) -> meshio.Mesh:
-    """Read a mesh written by `write_mesh`, with its cell sets and point sets."""
-    mesh = meshio.read(path)
-    for key in [key for key in mesh.cell_data if key.startswith(BOUNDARY_PREFIX)]:
-        name = key.removeprefix(BOUNDARY_PREFIX)
-        mesh.cell_sets[name] = [np.flatnonzero(flags) for flags in mesh.cell_data.pop(key)]
-    for key in [key for key in mesh.point_data if key.startswith(BOUNDARY_PREFIX)]:
-        mesh.point_sets[key.removeprefix(BOUNDARY_PREFIX)] = np.flatnonzero(mesh.point_data.pop(key))
-    return mesh
+    """Read a mesh written by `write_mesh`, or any other mesh file that can be read, with its sets."""
+    return read_format(Path(path))
 
 
 def completed(part: meshio.Mesh, seam: str, image: Callable[[Array], Array],

@@ -7,16 +7,19 @@ import inspect
 import logging
 import shlex
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
 from .checkpoint import load_checkpoint, load_state
+from .checks import refuse
 from .corridor import MESH, corridor_report, has_gmsh, lay_corridor
 from .errors import OutputError, ParameterError
 from .memory import check_memory
 from .models import AUTO, choose_model
+from .occupied import occupied
 from .options import NOT_PHYSICS, Options
 from .output import History, prepare_folder, write_atomic, write_summary
 from .pictures import draw_comparison, draw_run
@@ -31,6 +34,7 @@ __all__ = ["read_scene", "run_case"]
 log = logging.getLogger(__name__)
 SceneMaker = Callable[[dict[str, Any], Options], Scene]
 SCENE, SUMMARY = "scene.toml", "summary.json"
+PARTS = ("dynamic", "quasistatic")  # folders of the two runs of both analyses
 
 
 def run_case(case: Callable[..., Result], make_scene: SceneMaker, own: dict[str, Any], options: Options) -> Result:
@@ -54,9 +58,9 @@ def run_case(case: Callable[..., Result], make_scene: SceneMaker, own: dict[str,
     elif options.model:
         options, choice = choose_model(name, own, defaults, options)
     folder = options.resume or options.out or _default_folder(name, own, options)
-    note = ""
+    notes: list[str] = []
     if options.mesh_layout == "two-pass" and not has_gmsh():
-        note = "there is no gmsh to make the mesh of two passes: the mesh of the layout corridor is taken"
+        notes.append("there is no gmsh to make the mesh of two passes: the mesh of the layout corridor is taken")
         options = replace(options, mesh_layout="corridor")
     try:
         with Display(options.quiet) as display:
@@ -64,15 +68,22 @@ def run_case(case: Callable[..., Result], make_scene: SceneMaker, own: dict[str,
                 display.say(choice["text"])
             scene = replace(make_scene(own, options), choice=choice)
             check_memory(scene, display)
-            if not resume:
-                _begin(folder, options.overwrite)
-                if options.mesh_layout == "two-pass":
-                    options = lay_corridor(scene, own, options, folder, display)
-                    scene = replace(make_scene(own, options), choice=choice)
-                    check_memory(scene, display)
-            if options.analysis == "both":
-                return _run_both(scene, folder, display, resume, note)
-            return _run_one(scene, folder, display, resume, note=note)
+            with ExitStack() as locks:
+                places = [folder, *(folder / part for part in PARTS if options.analysis == "both")]
+                there = [place for place in places if place == folder or place.exists()]
+                notes += [locks.enter_context(occupied(place)) for place in there]
+                if not resume:
+                    refuse(scene)
+                    _begin(folder, options.overwrite)
+                    if options.mesh_layout == "two-pass":
+                        options = lay_corridor(scene, own, options, folder, display)
+                        scene = replace(make_scene(own, options), choice=choice)
+                        check_memory(scene, display)
+                        refuse(scene)
+                notes += [locks.enter_context(occupied(place)) for place in places if place not in there]
+                if options.analysis == "both":
+                    return _run_both(scene, folder, display, resume, notes)
+                return _run_one(scene, folder, display, resume, notes=notes)
     except (Interrupted, KeyboardInterrupt):
         begun = (folder / SCENE).exists()
         raise Interrupted("interrupted; " + (f"go on with skfsink resume {shlex.quote(str(folder))}" if begun else
@@ -151,8 +162,9 @@ def _begin(folder: Path, overwrite: bool) -> None:
         (folder / name).unlink(missing_ok=True)
 
 
-def _run_both(scene: Scene, folder: Path, display: Display, resume: bool, note: str) -> Result:
-    scenes = {analysis: scene.part(analysis) for analysis in ("dynamic", "quasistatic")}
+def _run_both(scene: Scene, folder: Path, display: Display, resume: bool,
+              notes: Sequence[str]) -> Result:
+    scenes = {analysis: scene.part(analysis) for analysis in PARTS}
     begun = {analysis: resume and (folder / analysis / SCENE).exists() for analysis in scenes}
     for analysis, part in scenes.items():  # refuse before any file is touched
         if begun[analysis]:
@@ -168,10 +180,12 @@ def _run_both(scene: Scene, folder: Path, display: Display, resume: bool, note: 
     for analysis, part in scenes.items():
         if not begun[analysis]:
             _begin(folder / analysis, overwrite=True)
-        parts[analysis] = _run_one(part, folder / analysis, display, begun[analysis], onset, note)
-        onset = load_state(folder / "dynamic" / Simulation.ONSET, scenes["dynamic"].fingerprint)
+        parts[analysis] = _run_one(part, folder / analysis, display, begun[analysis], onset, notes)
+        if parts[analysis].failed:
+            onset = load_state(folder / "dynamic" / Simulation.ONSET, scenes["dynamic"].fingerprint)
     display.phase("output")
-    draw_comparison(parts["dynamic"], parts["quasistatic"], folder)
+    if all(part.failed for part in parts.values()):
+        draw_comparison(parts["dynamic"], parts["quasistatic"], folder)
     first = parts["dynamic"]
     summary = {"schema": first.summary["schema"], "case": scene.case, "mesh": first.summary["mesh"], "analysis": "both",
                **{name: part.summary for name, part in parts.items()}}
@@ -181,15 +195,17 @@ def _run_both(scene: Scene, folder: Path, display: Display, resume: bool, note: 
 
 
 def _run_one(scene: Scene, folder: Path, display: Display, resume: bool, onset: State | None = None,
-             note: str = "") -> Result:
+             notes: Sequence[str] = ()) -> Result:
     simulation = Simulation(scene, folder, display, resume)
-    if note:
-        with simulation.notes:
+    with simulation.notes:
+        for note in filter(None, notes):
             log.warning(note)
     if not resume:
         simulation.checkpoint()  # from here on the run can be resumed, whenever it is killed
         write_atomic(folder / SCENE, scene.toml())
     space = scene.sample.space
+    for text in scene.sample.notes:
+        display.say(f"note: {text}")
     display.say(f"{scene.title}, mesh {scene.sample.name}: {space.n_elements} elements, {int(simulation.free.sum())} + "
                 f"{space.n_nodes} unknowns; {scene.controls.analysis} analysis in {folder}")
     state = simulation.run(None if onset is None else onset_copy(onset))
@@ -202,4 +218,5 @@ def _run_one(scene: Scene, folder: Path, display: Display, resume: bool, onset: 
     summary = {**summarize(scene, simulation), **corridor}
     write_summary(folder / SUMMARY, summary)
     display.update(1.0, str(folder))
+    display.say(summary["verdict"])
     return Result(folder, scene, summary, History.load(folder / "history.csv"), state, {})

@@ -15,6 +15,7 @@ import numpy as np
 import tomli_w
 
 from .density import SINKS
+from .digest import digest
 from .errors import OutputError, ParameterError, require
 from .explicit import ExplicitControls
 from .halving import Whole
@@ -175,6 +176,9 @@ class Scene:
         if self.controls.start == "rest" and (loading.knots or self.tractions):
             raise ParameterError("start rest is for grips of constant velocity; this scene has "
                                  f"{'tractions' if self.tractions else 'ramps'}: take start onset")
+        if self.controls.start == "rest" and loading.speed(0.0) == 0.0:
+            raise ParameterError("start rest needs a grip that moves; all of them are still: give one a velocity, or "
+                                 "take start onset")
 
     @property
     def parts(self) -> tuple[Region, ...]:
@@ -240,7 +244,10 @@ class Scene:
 
     @property
     def fingerprint(self) -> str:
-        """Hash of all that decides the results of the run: parameters, loads, regions, and the mesh, wherever it is."""
+        """Hash of all that decides the results of the run, whatever the scene was made from, and wherever the mesh is.
+
+        It has two parts, the older one of which checkpoints of earlier versions have alone; see :mod:`.checkpoint`.
+        """
         text = replace(self, parameters={**self.parameters, "mesh": ""}, choice={}).toml()
         hashed, space = hashlib.sha256(text.encode()), self.sample.space
         for array in (space.X, space.conn, *(nodes for _, nodes in sorted(self.sample.boundaries.items()))):
@@ -248,7 +255,10 @@ class Scene:
         hashed.update(f"{self.grips} {self.rollers} {self.tractions}".encode())
         for region in self.regions:
             hashed.update(f"{region.name} {region.material} {region.sink_law}".encode() + region.elements.tobytes())
-        return hashed.hexdigest()
+        controls = replace(self.controls, checkpoint_every=Controls.checkpoint_every)  # a checkpoint changes nothing
+        rest = digest([controls, self.material, self.sink_law, self.regions, self.grips, self.rollers, self.tractions,
+                       self.faces, self.whole, self.sample.boundaries])
+        return f"{hashed.hexdigest()}-{rest}"
 
 
 def read_parameters(folder: Path, case: str) -> dict[str, Any]:

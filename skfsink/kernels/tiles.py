@@ -17,8 +17,8 @@ from typing import NamedTuple
 
 import numba
 import numpy as np
-from numba import njit
 
+from ..jit import njit
 from ..material import CompiledLaw
 from ..space import Space
 from .faster import Faster

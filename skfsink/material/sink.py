@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit
 from scipy.special import gamma as gamma_function
 from scipy.special import gammaincc
 
 from ..errors import require
+from ..jit import njit
 
 __all__ = ["SinkLaw"]
 
@@ -59,6 +59,12 @@ class SinkLaw:
         m = int(self.m) if float(self.m).is_integer() else self.m  # integer powers are products, five times as fast
         _history(W.ravel(), 1 / self.phi, m, float(np.exp(-40 / self.m)), H)
         return H.reshape(W.shape)
+
+    def coefficients(self, W: np.ndarray) -> np.ndarray:
+        """Coefficients 1/(H + eps) of the sink in Eq. (9) for the greatest stored energy W [MPa], of the same shape."""
+        H = self.history(W)
+        H += self.epsilon
+        return np.divide(1.0, H, out=H)
 
     @property
     def failure_energy(self) -> float:

@@ -21,9 +21,14 @@ if TYPE_CHECKING:
 __all__ = ["FIGURES", "draw", "read_rows", "write_csv", "write_parquet"]
 
 #: columns of the table: name, unit, and where a summary has the figure
-FIGURES = (
+FIGURES: tuple[tuple[str, str, tuple[str | int, ...]], ...] = (
+    ("greatest_load", "N/mm", ("loading", "greatest_load")),
     ("onset_displacement", "mm", ("onset", "displacement_mm")),
     ("onset_load", "N/mm", ("onset", "reaction_N_per_mm")),
+    ("onset_boundary", "", ("onset", "boundary")),
+    ("onset_x", "mm", ("onset", "place_mm", 0)),
+    ("onset_y", "mm", ("onset", "place_mm", 1)),
+    ("onset_z", "mm", ("onset", "place_mm", 2)),
     ("U", "N mm/mm", ("energy", "U_paper_at_arrival")),
     ("D", "N mm/mm", ("energy", "D_sink_at_arrival")),
     ("tip_speed", "m/s", ("event", "mean_tip_speed_m_per_s")),
@@ -48,14 +53,18 @@ def read_rows(folders: Sequence[Path], varied: Sequence[Mapping[str, Any]]) -> l
         for part in parts:
             row = {**values, "analysis": part.get("analysis"), **{name: _look(part, at) for name, _, at in FIGURES}}
             row["failure"] = failure.read_text().strip() if failure.is_file() else None if part else "not finished"
+            row["verdict"] = part.get("verdict")
             row["folder"] = folder.name
             rows.append(row)
     return rows
 
 
-def _look(summary: Any, at: tuple[str, ...]) -> Any:
+def _look(summary: Any, at: tuple[str | int, ...]) -> Any:
     for key in at:
-        summary = summary.get(key) if isinstance(summary, dict) else None
+        if isinstance(summary, list) and isinstance(key, int):
+            summary = summary[key] if key < len(summary) else None
+        else:
+            summary = summary.get(key) if isinstance(summary, dict) else None
     return summary
 
 
