@@ -273,12 +273,16 @@ def test_middle_nodes_are_the_middles_of_edges() -> None:
     assert any("1 middle node(s) were not near the middle" in note for note in sample.notes)
 
 
-def test_second_order_in_space() -> None:
+@pytest.mark.parametrize("name", ["tetrahedra", "wedges and hexahedra"])
+def test_second_order_in_space(name: str) -> None:
     """Fails if straight elements of second order are split otherwise than those of first order, or a set of nodes of
     one side gains nodes inside."""
-    mesh = tetrahedra()
+    mesh = MESHES[name]()
     mesh.point_sets["outside"] = np.flatnonzero(((mesh.points == 0) | (mesh.points == 1)).any(axis=1))
-    pairs = {"tetra": [(0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)], "triangle": [(0, 1), (1, 2), (2, 0)]}
+    pairs = {"tetra": [(0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)],
+             "wedge": [(0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5)],
+             "hexahedron": [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6),
+                            (3, 7)], "triangle": [(0, 1), (1, 2), (2, 0)], "quad": [(0, 1), (1, 2), (2, 3), (3, 0)]}
     number: dict[tuple[int, ...], int] = {}
     blocks = []
     for block in mesh.cells:
@@ -413,6 +417,41 @@ def test_solids_keep_their_faces(tmp_path: Path) -> None:
     sample = mesh_sample("cube", made)
     assert sides_of(sample, "lid") == pytest.approx(1) and sides_of(sample, "wall") == pytest.approx(1)
     assert (sample.space.X[sample.nodes("lid")][:, 2] == 1).all()
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_collapsed_elements(name: str, tmp_path: Path) -> None:
+    """Fails if a triangle written as a quadrilateral, or a wedge or tetrahedron as a hexahedron, is refused, or leaves
+    its sets."""
+    mesh = MESHES[name]()
+    spread = {"triangle": [0, 1, 2, 2], "tetra": [0, 1, 2, 2, 3, 3, 3, 3], "wedge": [0, 1, 2, 2, 3, 4, 5, 5],
+              "quad": [0, 1, 2, 3], "hexahedron": list(range(8))}
+    for i, block in enumerate(mesh.cells):
+        if block.type != "line":
+            turn = np.roll(np.arange(4), i)  # begin at any corner
+            cells = block.data[:, spread[block.type]]
+            mesh.cells[i] = meshio.CellBlock("quad" if block.dim == 2 else "hexahedron",
+                                             cells[:, turn if block.dim == 2 else [*turn, *(turn + 4)]])
+    write_mesh(tmp_path / "in.vtu", mesh)
+    with pytest.raises(MeshError, match="it has a node twice; if that is how"):
+        file_sample(tmp_path / "in.vtu")
+    sample, wanted = mesh_sample("in", converted(tmp_path / "in.vtu")), mesh_sample("split", split(MESHES[name]()))
+    assert sample.space.V.sum() == pytest.approx(wanted.space.V.sum(), rel=1e-13)
+    assert sample.space.n_elements == wanted.space.n_elements and sample.space.n_nodes == wanted.space.n_nodes
+    for boundary in wanted.boundaries:
+        assert len(sample.nodes(boundary)) == len(wanted.nodes(boundary)) > 2, boundary
+    for region in wanted.cells:
+        assert len(sample.elements(region)) == len(wanted.elements(region))
+        assert sample.space.V[sample.elements(region)].sum() == pytest.approx(
+            wanted.space.V[wanted.elements(region)].sum(), rel=1e-12)
+
+
+def test_elements_that_are_pinched(tmp_path: Path) -> None:
+    """Fails if an element that is no other one is taken for one."""
+    square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
+    meshio.write(tmp_path / "a.vtk", meshio.Mesh(square, [("quad", np.array([[0, 1, 0, 2], [0, 1, 2, 3]]))]))
+    with pytest.raises(MeshError, match="has a node twice"):
+        converted(tmp_path / "a.vtk")
 
 
 def test_planes_inside_are_no_boundaries(tmp_path: Path) -> None:
