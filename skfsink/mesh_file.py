@@ -114,7 +114,9 @@ def check_mesh(name: str, mesh: meshio.Mesh) -> None:
                         f"they reach over {2 * extents[2]:g} mm")
     nodes = np.sort(mesh.cells_dict[kind].astype(np.int64), axis=1)
     if (twice := (nodes[:, 1:] == nodes[:, :-1]).any(axis=1)).any():
-        raise MeshError(f"mesh {name}: element {int(twice.argmax())} is inverted or degenerate: it has a node twice")
+        raise MeshError(f"mesh {name}: element {int(twice.argmax())} is inverted or degenerate: it has a node twice; "
+                        f"if that is how your program writes triangles or wedges, convert it with skfsink mesh {name} "
+                        f"OUT.vtu")
     rows = np.ascontiguousarray(nodes).view(np.dtype((np.void, nodes.itemsize * nodes.shape[1]))).ravel()
     if (again := len(rows) - len(np.unique(rows))):
         raise MeshError(f"mesh {name} has {again} element(s) more than once")

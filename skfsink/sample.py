@@ -138,7 +138,7 @@ def file_sample(path: Path, merge_nodes: float = 0.0) -> Sample:
     MeshError
         As of :func:`load_sample`.
     """
-    sample = _from_file(path, merge_nodes)
+    sample = _from_file(path, merge_nodes, option=True)
     X = sample.space.X
     near = SIDE * float(np.ptp(X, axis=0).max())
     sides = {}
@@ -200,14 +200,14 @@ def _as_it_is(mesh: meshio.Mesh) -> meshio.Mesh:
     return mesh
 
 
-def _from_file(path: Path, merge_nodes: float = 0.0) -> Sample:
-    """The sample in a mesh file, in one piece."""
+def _from_file(path: Path, merge_nodes: float = 0.0, option: bool = False) -> Sample:
+    """The sample in a mesh file, in one piece; `option` says that the scene has the parameter `merge_nodes`."""
     name = one_line(str(path))
     data = read_mesh_file(path)
     if merge_nodes:
         check_mesh(name, merged(name, data, merge_nodes))
     sample = _from_meshio(str(path), data)
-    check_one_piece(sample.name, shlex.quote(name), sample.space)
+    check_one_piece(sample.name, shlex.quote(name), sample.space, option)
     if len(nodes := hinges(sample.space)):
         what = "node" if sample.space.dim == 2 else "node or edge"
         note = (f"parts of the body hang together by a single {what}, at {len(nodes)} node(s), such as "

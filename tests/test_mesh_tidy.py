@@ -15,7 +15,7 @@ from skfsink.mesh_file import read_mesh_file
 from skfsink.mesh_files.pieces import hinges, merged
 from skfsink.mesh_files.tidy import base_of, tidied
 from skfsink.meshing import write_mesh
-from skfsink.sample import Sample, file_sample
+from skfsink.sample import Sample, file_sample, load_sample
 
 
 def sample_of(folder: Path, mesh: meshio.Mesh) -> Sample:
@@ -185,6 +185,13 @@ def test_pieces_are_refused(parts: list[tuple[int, int, tuple[float, float]]], s
     with pytest.raises(MeshError) as error:
         file_sample(tmp_path / "parts.vtu")
     assert [part for part in said if part not in str(error.value)] == []
+
+
+def test_pieces_in_a_case_of_the_paper(tmp_path: Path) -> None:
+    """Fails if the line names an option that the case has not."""
+    write_mesh(tmp_path / "parts.vtu", beside(grid(2, 3), grid(2, 3, (1, 0))))
+    with pytest.raises(MeshError, match="within 1e-6 mm: mend the file with skfsink mesh "):
+        load_sample("single_edge_notch", str(tmp_path / "parts.vtu"))
 
 
 def test_merged_pieces_are_the_whole(tmp_path: Path) -> None:
