@@ -24,7 +24,8 @@ _ARRAYS = ("u", "v", "a", "gamma", "W_max", "deleted")
 def _state_arrays(state: State) -> dict[str, np.ndarray]:
     times = np.array([t for t, _ in state.deletions])
     elements = np.array([e for _, e in state.deletions], np.int64)
-    return {**{name: getattr(state, name) for name in _ARRAYS}, "deletion_times": times, "deletion_elements": elements}
+    sink = {} if state.sink is None else {"sink": state.sink}
+    return {**{name: getattr(state, name) for name in _ARRAYS}, **sink, "deletion_times": times, "deletion_elements": elements}
 
 
 def _state_scalars(state: State) -> dict[str, Any]:
@@ -34,7 +35,7 @@ def _state_scalars(state: State) -> dict[str, Any]:
 
 def _rebuild(arrays: dict[str, np.ndarray], scalars: dict[str, Any]) -> State:
     log = list(zip(arrays["deletion_times"].tolist(), arrays["deletion_elements"].tolist()))
-    return State(**{name: arrays[name] for name in _ARRAYS}, deletions=log, grip=scalars["grip"],
+    return State(**{name: arrays[name] for name in _ARRAYS}, sink=arrays.get("sink"), deletions=log, grip=scalars["grip"],
                  time=scalars["time"], step=scalars["step"], phase=scalars["phase"],
                  ledger=Ledger(**scalars["ledger"]))
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -24,16 +25,35 @@ from .errors import ConvergenceError, ParameterError
 from .material import SinkLaw
 from .regions import Region, by_element, check_lengths, rest_of
 from .space import Pattern, Space
-from .zone import ActiveZone
+from .zone import ActiveZone, Zone
 
-__all__ = ["SINKS", "DensitySolver"]
+__all__ = ["SINKS", "Density", "DensitySolver"]
 
 SINKS = ("lumped", "consistent", "nearest")
 log = logging.getLogger(__name__)
 
 
+class Density(NamedTuple):
+    """The relative density of a state, with what it was found from.
+
+    It belongs to its state: a method that gives up a step goes back to the one of the state before.
+
+    Attributes
+    ----------
+    gamma: nodal values, (n,).
+    sink: coefficients 1/(H + eps) whose solution gamma is, (ne, nq); None if that is not known.
+    zones: active zones in which it was found, to look in first the next time (see :mod:`.zone`).
+    """
+
+    gamma: np.ndarray
+    sink: np.ndarray | None = None
+    zones: tuple[Zone, ...] = ()
+
+
 class DensitySolver:
     """Solves for the nodal gamma, given the greatest stored energy W each Gauss point has seen.
+
+    Its solutions are functions of the arguments alone: what it keeps between calls are counts.
 
     Parameters
     ----------
@@ -71,8 +91,6 @@ class DensitySolver:
         self._direct: Factorization | None = None
         self._amg = AmgCG(self.pattern.matrix(self._assemble(np.ones_like(space.w))), tolerance)
         self.zone = ActiveZone(space.X, law.length_scale, self._amg) if active_zone and sink != "consistent" else None
-        self.last_sink: np.ndarray | None = None  #: coefficients of the last solve, (ne, nq)
-        self._last_W = np.full_like(space.w, np.nan)  # history of the last solve; unknown after a restore
         self._residual = 0.0
         self.solves = self.skipped = self.iterations = self.fallbacks = 0
 
@@ -91,11 +109,15 @@ class DensitySolver:
         """Numerical factorisations made so far."""
         return 0 if self._direct is None else self._direct.count
 
-    def solve(self, W_max: np.ndarray, gamma: np.ndarray,
-              tolerance: float | None = None) -> np.ndarray:
-        """Nodal gamma (n,) for the history `W_max` (ne, nq) [MPa], from the guess `gamma`.
+    def solve(self, W_max: np.ndarray, gamma: np.ndarray, tolerance: float | None = None) -> np.ndarray:
+        """Nodal gamma (n,) for the history `W_max` (ne, nq) [MPa], from the guess `gamma`; see :meth:`update`."""
+        return self.update(W_max, Density(gamma), tolerance).gamma
 
-        Given a `tolerance` of the relative residual, other than the solver's, it looks in the active zone first.
+    def update(self, W_max: np.ndarray, before: Density, tolerance: float | None = None) -> Density:
+        """The density for the history `W_max` (ne, nq) [MPa]: `before` itself where no sink coefficient has moved.
+
+        Given a `tolerance` of the relative residual, other than the solver's, it looks in the active zones of `before`
+        first.
 
         Raises
         ------
@@ -104,75 +126,45 @@ class DensitySolver:
         """
         if not np.isfinite(W_max.max()):  # infinite, it would make a dead point in silence
             raise ConvergenceError("the stored energy of a Gauss point is not finite: lower --courant or --hht-dt")
-        sink = self._coefficients(W_max)
-        if sink is None:
+        sink = self.coefficients(W_max)
+        if before.sink is not None and not _changed(sink, before.sink, self.unchanged):
             self.skipped += 1
-            return gamma
+            return before
         self.solves += 1
-        self.last_sink = None  # until this one has succeeded
         data = self._assemble(sink)
-        result = None
+        result, zones = None, before.zones
         if self.sink != "consistent" or sink.max() < 1e3 * sink.min():
-            result = self._iterate(self.pattern.matrix(data), data[self.pattern.diagonal], gamma, tolerance)
+            result, zones = self._iterate(self.pattern.matrix(data), data[self.pattern.diagonal], before, tolerance)
         if result is None:
             result = self._factorise(data)
         if self.sink != "consistent" and not (-self._error < result.min() and result.max() < 1 + self._error):
             raise ConvergenceError(f"the relative density left (0, 1]: {result.min():.3g} to {result.max():.6g}; the "
                                    f"mesh has elements so flat that the lumped sink loses its maximum principle")
-        self.last_sink = sink
-        return result
+        return Density(result, sink, zones)
 
-    def _coefficients(self, W_max: np.ndarray) -> np.ndarray | None:
-        """Sink coefficients 1/(H + eps), (ne, nq), anew where the history has moved; None if none is another."""
-        if self.last_sink is None:
-            np.copyto(self._last_W, W_max)
-            return 1.0 / (self._history(W_max) + self.law.epsilon)
-        moved = _moved(W_max, self._last_W)
-        news = []
-        for elements, law in self._parts:
-            mine = elements[moved[elements]] if len(self._parts) > 1 else np.flatnonzero(moved)
-            new = 1.0 / (law.history(W_max[mine]) + self.law.epsilon)
-            news.append((mine, new))
-        if not any(_changed(new, self.last_sink[mine], self.unchanged) for mine, new in news):
-            return None
-        for mine, new in news:
-            self.last_sink[mine] = new
-            self._last_W[mine] = W_max[mine]
-        return self.last_sink
-
-    def _history(self, W_max: np.ndarray) -> np.ndarray:
-        """H of Eq. (10), (ne, nq), each element by its law."""
+    def coefficients(self, W_max: np.ndarray) -> np.ndarray:
+        """Sink coefficients 1/(H + eps) of Eq. (9, 10), (ne, nq), each element by its law."""
         if len(self._parts) == 1:
-            return self.law.history(W_max)
-        H = np.empty_like(W_max)
+            return self.law.coefficients(W_max)
+        sink = np.empty_like(W_max)
         for elements, law in self._parts:
-            H[elements] = law.history(W_max[elements])
-        return H
+            sink[elements] = law.coefficients(W_max[elements])
+        return sink
 
-    def _iterate(self, A: csr_array, D: np.ndarray, gamma: np.ndarray, tolerance: float | None) -> np.ndarray | None:
-        """Solution by AMG-CG, in the active zone where that is enough; None if it did not converge."""
+    def _iterate(self, A: csr_array, D: np.ndarray, before: Density,
+                 tolerance: float | None) -> tuple[np.ndarray | None, tuple[Zone, ...]]:
+        """Solution by AMG-CG, in the active zone where that is enough, None if it did not converge; and the zones."""
+        gamma, zones = before.gamma, before.zones
         if self.zone is not None and tolerance is not None:
-            gamma, met, iterations = self.zone.solve(A, D, self.load, gamma, tolerance)
+            gamma, met, iterations, zones = self.zone.solve(A, D, self.load, gamma, tolerance, zones)
             self.iterations += iterations
             self._residual = self.zone.residual
             if met:
-                return gamma
+                return gamma, zones
         result = self._amg.solve(A, D, self.load, gamma, tolerance)
         self.iterations += self._amg.iterations
         self._residual = self._amg.residual
-        return result
-
-    def memory(self) -> dict[str, np.ndarray]:
-        """What the solver remembers, for a checkpoint."""
-        if self.last_sink is None:
-            return {}
-        return {"last_sink": self.last_sink, **(self.zone.memory() if self.zone is not None else {})}
-
-    def restore(self, memory: dict[str, np.ndarray]) -> None:
-        """Take up what :meth:`memory` gave."""
-        self.last_sink = memory.get("last_sink")
-        if self.zone is not None and "zone_depths" in memory:
-            self.zone.restore(memory)
+        return result, zones
 
     def _assemble(self, sink: np.ndarray) -> np.ndarray:
         if self.sink == "consistent":
@@ -213,14 +205,3 @@ def _changed(new, old, tolerance):  # type: ignore[no-untyped-def]
             if abs(new[e, q] - old[e, q]) > tolerance * old[e, q]:
                 return True
     return False
-
-
-@njit(cache=True)
-def _moved(new, old):  # type: ignore[no-untyped-def]
-    """Mask of the rows that are not the same."""
-    moved = np.zeros(new.shape[0], np.bool_)
-    for e in range(new.shape[0]):
-        for q in range(new.shape[1]):
-            if new[e, q] != old[e, q]:
-                moved[e] = True
-    return moved

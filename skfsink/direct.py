@@ -159,8 +159,8 @@ class _Pardiso:
 
     def __init__(self, pattern: Pattern, kind: int, threads: int) -> None:
         self._pattern, self._kind, self._data = pattern, kind, np.zeros(pattern.nnz)
+        self._threads = threads
         self._handle = handle = pypardiso.PyPardisoSolver(mtype=kind)
-        handle.libmkl.MKL_Set_Num_Threads(threads)
         handle.iparm[:] = 0
         handle.iparm[0] = 1       # the values below, none by default
         handle.iparm[1] = 2       # nested dissection
@@ -191,12 +191,17 @@ class _Pardiso:
         numbers = [ctypes.byref(ctypes.c_int32(i)) for i in (1, 1, self._kind, phase, pattern.size)]
         index = ctypes.POINTER(ctypes.c_int32)
         error = ctypes.c_int32(0)
-        handle._mkl_pardiso(
-            handle.pt.ctypes.data_as(ctypes.POINTER(handle._pt_type[0])), *numbers,
-            self._data.ctypes.data_as(ctypes.c_void_p), pattern.indptr.ctypes.data_as(index),
-            pattern.indices.ctypes.data_as(index), handle.perm.ctypes.data_as(index), ctypes.byref(ctypes.c_int32(1)),
-            handle.iparm.ctypes.data_as(index), ctypes.byref(ctypes.c_int32(0)), b.ctypes.data_as(ctypes.c_void_p),
-            x.ctypes.data_as(ctypes.c_void_p), ctypes.byref(error))
+        # MKL's number of threads is one for the process: each call brings its own, and leaves the other as it was
+        before = handle.libmkl.MKL_Set_Num_Threads_Local(self._threads)
+        try:
+            handle._mkl_pardiso(
+                handle.pt.ctypes.data_as(ctypes.POINTER(handle._pt_type[0])), *numbers,
+                self._data.ctypes.data_as(ctypes.c_void_p), pattern.indptr.ctypes.data_as(index),
+                pattern.indices.ctypes.data_as(index), handle.perm.ctypes.data_as(index),
+                ctypes.byref(ctypes.c_int32(1)), handle.iparm.ctypes.data_as(index), ctypes.byref(ctypes.c_int32(0)),
+                b.ctypes.data_as(ctypes.c_void_p), x.ctypes.data_as(ctypes.c_void_p), ctypes.byref(error))
+        finally:
+            handle.libmkl.MKL_Set_Num_Threads_Local(before)
         if error.value not in (0, self.NOT_DEFINITE):
             raise ConvergenceError(f"the direct solver failed: PARDISO reports error {error.value}"
                                    + (" (not enough memory)" if error.value in (-2, -9) else ""))

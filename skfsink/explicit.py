@@ -26,13 +26,14 @@ import numpy as np
 from numba import njit
 
 from .deletion import delete_failed, left_in
-from .density import DensitySolver
+from .density import Density, DensitySolver
 from .errors import InstabilityError, require
 from .frequency import highest_frequency
 from .loading import Loading
 from .momentum import Momentum
 from .space import Pattern
 from .state import State
+from .zone import Zone
 
 __all__ = ["Explicit", "ExplicitControls"]
 
@@ -109,6 +110,7 @@ class Explicit:
         self._last_estimate = 0
         self._urgent = False
         self._since_gamma = 0
+        self._zones: tuple[Zone, ...] = ()
 
     def start(self, state: State) -> None:
         """Forces, masses and accelerations of `state`; to be called once before stepping, and after a resume."""
@@ -198,13 +200,14 @@ class Explicit:
         """Solve for gamma from the history, book what the sink takes, delete failed elements."""
         momentum, ledger = self.momentum, state.ledger
         self.sync(state)
-        solves = self.density.solves
-        state.gamma = self.density.solve(state.W_max, state.gamma, self.GAMMA_TOLERANCE)
-        if self.density.solves == solves:
+        before = Density(state.gamma, state.sink, self._zones)
+        now = self.density.update(state.W_max, before, self.GAMMA_TOLERANCE)
+        if now is before:
             return
+        state.gamma, state.sink, self._zones = now
         failed = delete_failed(self.space, state, self.deletion, self.density.failure_energy)
         left = left_in(momentum, state.gamma, failed) if failed.size else 0.0
-        dead, before = momentum.dead, None if momentum.dead is None else momentum.dead.values
+        dead, loads = momentum.dead, None if momentum.dead is None else momentum.dead.values
         stored = momentum.set_gamma(state.gamma, state.deleted)
         mass = self.mass
         self._set_mass()
@@ -212,8 +215,8 @@ class Explicit:
         ledger.deletion += left
         half_v2 = _half_square(state.v)
         ledger.sink_kinetic += float((mass - self.mass) @ half_v2)
-        if dead is not None and before is not None:
-            ledger.work += dead.changed(before, state.u)
+        if dead is not None and loads is not None:
+            ledger.work += dead.changed(loads, state.u)
             ledger.loads = dead.potential(state.u)
         self._elastic -= stored
         ledger.elastic = self._elastic
@@ -263,7 +266,8 @@ class Explicit:
         assert self._mode is not None
         scalars = [self.dt, self._omega, self._indicator0, self._last_estimate, self.estimates, self._elastic,
                    self._urgent, self._since_gamma]
-        return {"mode": self._mode, "scalars": np.array(scalars, float), "reaction": self.reaction}
+        depths = {"zone_depths": np.array([zone.depth for zone in self._zones])} if self._zones else {}
+        return {"mode": self._mode, "scalars": np.array(scalars, float), "reaction": self.reaction, **depths}
 
     def restore(self, state: State, memory: dict[str, np.ndarray]) -> None:
         """Go on exactly where :meth:`memory` was taken."""
@@ -274,6 +278,8 @@ class Explicit:
         self._last_estimate, self.estimates = int(scalars[3]), int(scalars[4])
         self._urgent, self._since_gamma = bool(scalars[6]), int(scalars[7])
         self.reaction = memory["reaction"]
+        if self.density.zone is not None:
+            self._zones = tuple(self.density.zone.of_depth(depth) for depth in memory.get("zone_depths", ()))
 
 
 def _half_square(v: np.ndarray) -> np.ndarray:

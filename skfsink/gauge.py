@@ -18,8 +18,8 @@ class Gauge:
     """Load and displacement of a scene.
 
     The load is the force on the first grip that ever moves, along its motion; of one that follows ramps that is its
-    motion in the last stretch of time in which it moves. The displacement is that of this grip relative to the last
-    other one, in the same direction. Without a grip that moves they are those of the first traction: its force, and
+    motion in the last stretch of time in which it moves, or away from where it began if it moves back then. The
+    displacement is that of this grip relative to the last other one, in the same direction. Without a grip that moves they are those of the first traction: its force, and
     the mean displacement of its boundary relative to that of the last other traction, or to the grips.
     """
 
@@ -63,11 +63,14 @@ class Gauge:
 
 def _last(values: Sequence[float | Ramp | None]) -> np.ndarray:
     """Rates of the components in the last stretch of time in which one of them changes."""
+    ramps = [v for v in values if isinstance(v, Ramp)]
     times = sorted({0.0, *(t for v in values if isinstance(v, Ramp) for t in v.times)}, reverse=True)
     for t in times:
         rates = np.array([v.rate(t) if isinstance(v, Ramp) else v or 0.0 for v in values])
         if rates.any():
-            return rates
+            end = min((knot for ramp in ramps for knot in ramp.times if knot > t), default=t)
+            middle = np.array([v.value(0.5 * (t + end)) if isinstance(v, Ramp) else 0.0 for v in values])
+            return -rates if float(middle @ rates) < 0.0 else rates
     return np.zeros(len(values))
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from . import indicators
 from .errors import InstabilityError
 from .momentum import Momentum
-from .regions import Region
+from .regions import Region, by_element
 from .scene import Scene
 from .state import State
 
@@ -87,12 +87,15 @@ class Guard:
     NEGATIVE = -1e-6       # gamma below which a nodal density is no rounding
     SUDDEN = 0.05, 20      # share of the elements, and their number, that may fail in one step
     DEAD = 0.2             # mean density below which a body is gone
+    EVEN = 0.8, 0.9        # of the greatest W/Phi, and the share of the body from which on it is loaded evenly
     CARRIED = 0.01         # energy in deleted elements, of the onset energy, that is warned of
 
     def __init__(self, scene: Scene, momentum: Momentum) -> None:
         self.scene, self.momentum = scene, momentum
         self.space = scene.sample.space
         self.scale = 0.0     #: energy at the onset, to which the others are compared
+        self.evenness = 0.0  #: share of the body that was loaded about as much as its weakest point at the onset
+        self.dissolved = False  #: whether a body that was loaded evenly has failed everywhere at once
         self._deleted = -1   # elements at the last step
         self._inside_out = False
 
@@ -150,6 +153,7 @@ class Guard:
             The ledger of the loading does not close, or a live point is inside out.
         """
         space, l = self.space, self.scene.sink_law.length_scale
+        self.evenness = self._even_share(state)
         weakest = int(np.argmin(state.gamma))
         h = indicators.size_near(space, weakest, l)
         if h > l / self.COARSE:
@@ -162,6 +166,19 @@ class Guard:
             raise InstabilityError(f"the ledger of the loading is open by {error:.2%} of the stored energy, allowed "
                                    f"{allowed:.2%}: take smaller load increments, or raise --balance-tolerance")
         self._check_shape(state)
+
+    def _even_share(self, state: State) -> float:
+        """Share of the volume whose W/Phi is at least `EVEN` times the greatest one."""
+        phi = by_element(self.space.n_elements, self.scene.sink_law.phi, self.scene.regions,
+                         lambda region: region.sink_law.phi)
+        ratio = state.W_max.max(axis=1) / phi
+        V = self.space.V
+        return float(V[ratio >= self.EVEN[0] * ratio.max()].sum() / V.sum())
+
+    def _has_dissolved(self) -> bool:
+        """Whether this body may fail everywhere at once, since it is loaded evenly; it has, then."""
+        self.dissolved = self.dissolved or self.evenness > self.EVEN[1]
+        return self.dissolved
 
     def _check_pressure(self, state: State) -> None:
         """Pressures that alternate, in each material for itself: they jump from one to another."""
@@ -200,7 +217,7 @@ class Guard:
                                    f"--balance-tolerance")
         before, self._deleted = self._deleted, len(state.deletions)
         failed, share = self._deleted - before, self.SUDDEN[0] * self.space.n_elements
-        if before >= 0 and failed > max(share, self.SUDDEN[1]):
+        if before >= 0 and failed > max(share, self.SUDDEN[1]) and not self._has_dissolved():
             raise InstabilityError(f"{failed} of {self.space.n_elements} elements failed in one step at "
                                    f"{self._when(state)}, allowed {max(int(share), self.SUDDEN[1])}: this is no crack "
                                    f"but a mesh that dies of a bad state; {self._step_cure}")
@@ -236,7 +253,7 @@ class Guard:
         if least < self.NEGATIVE:
             log.warning("the relative density falls to %.2g: the %s sink has no maximum principle; such points are "
                         "taken as dead. --sink lumped keeps it in (0, 1]", least, self.scene.controls.sink)
-        if indicators.mean_density(space, state.gamma) < self.DEAD:
+        if indicators.mean_density(space, state.gamma) < self.DEAD and not self._has_dissolved():
             raise InstabilityError(f"less than {self.DEAD:.0%} of the body is left at {self._when(state)}: this is no "
                                    f"crack but a mesh that dies of a bad state; {self._step_cure}")
         h = space.h[state.deleted]

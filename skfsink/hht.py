@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .deletion import delete_failed
-from .density import DensitySolver
+from .density import Density, DensitySolver
 from .direct import Factorization
 from .errors import ConvergenceError
 from .hht_controls import HHTControls
@@ -41,7 +41,7 @@ log = logging.getLogger(__name__)
 class _Trial(NamedTuple):
     u: np.ndarray
     a: np.ndarray
-    gamma: np.ndarray
+    density: Density
     force: np.ndarray
     W: np.ndarray
     mass: np.ndarray
@@ -154,7 +154,8 @@ class HHT:
     def _damage(self, state: State) -> None:
         """Single pass: bring gamma up to the history of the accepted state, at fixed displacement and velocity."""
         momentum, ledger = self.momentum, state.ledger
-        state.gamma = self.density.solve(state.W_max, state.gamma)
+        new = self.density.update(state.W_max, Density(state.gamma, state.sink))
+        state.gamma, state.sink = new.gamma, new.sink
         momentum.set_time(state.grip)
         momentum.set_gamma(state.gamma, state.deleted)
         self._book_loads(state)
@@ -179,9 +180,9 @@ class HHT:
     def _attempt(self, state: State, dt: float, end: float) -> tuple[_Trial | None, int]:
         c, momentum = self.controls, self.momentum
         free = self.free
-        gamma = state.gamma
+        density = Density(state.gamma, state.sink)
         momentum.set_time(end)
-        momentum.set_gamma(gamma, state.deleted)
+        momentum.set_gamma(density.gamma, state.deleted)
         mass = self.inertia.matrix()
         shape = state.u.shape
         base = state.u + dt * state.v + dt * dt * (0.5 - c.beta) * state.a
@@ -207,7 +208,7 @@ class HHT:
             increment = float(np.abs((u - state.u).ravel()[free][live]).max()) + self._rounding[1]
             balanced = np.abs(r[live]).max() <= c.force_tolerance * level
             if balanced and correction <= c.correction_tolerance * increment and settled:
-                if dt > self._failing_step and float((state.gamma - gamma).max()) > 0.5:
+                if dt > self._failing_step and float((state.gamma - density.gamma).max()) > 0.5:
                     # converged, but to a crack that has run through a single step
                     if not (self.loading or self._cut):
                         log.warning("a step of %.3g s would let a crack run through at once: steps in which elements "
@@ -215,7 +216,7 @@ class HHT:
                                     dt, self._failing_step)
                         self._cut = True
                     return None, iteration
-                return _Trial(u, a, gamma, force, momentum.W, mass, self.inertia.places()), iteration
+                return _Trial(u, a, density, force, momentum.W, mass, self.inertia.places()), iteration
             if iteration == c.max_iterations:
                 break
             self.iterations += 1
@@ -235,14 +236,13 @@ class HHT:
                 momentum.force(u)
                 if not (momentum.least_J > self.LEAST_J and np.isfinite(momentum.energy)):
                     return None, iteration
-                new = self.density.solve(np.maximum(state.W_max, momentum.W), gamma)
-                last, change = change, float(np.abs(new - gamma).max())
+                gamma, density = density.gamma, self.density.update(np.maximum(state.W_max, momentum.W), density)
+                last, change = change, float(np.abs(density.gamma - gamma).max())
                 settled = change <= c.gamma_tolerance
                 growing = growing + 1 if change > last else 0
                 if self.loading and growing >= 3:
                     return None, iteration
-                gamma = new
-                momentum.set_gamma(gamma, state.deleted)
+                momentum.set_gamma(density.gamma, state.deleted)
                 mass = self.inertia.matrix()
         return None, c.max_iterations
 
@@ -291,7 +291,7 @@ class HHT:
             self._loads = momentum.dead.values
         # commit
         self._rate = du / dt
-        state.u, state.gamma = trial.u, trial.gamma
+        state.u, state.gamma, state.sink = trial.u, trial.density.gamma, trial.density.sink
         state.a = trial.a.copy()
         state.v.reshape(-1)[free] = v1
         state.W_max = np.maximum(state.W_max, trial.W)

@@ -6,7 +6,7 @@ import numpy as np
 
 from .space import Space
 
-__all__ = ["alternation", "element_pressure", "inverted", "mean_density", "size_near", "turning"]
+__all__ = ["alternation", "element_pressure", "greatest_stretch", "inverted", "mean_density", "size_near", "turning"]
 
 
 def turning(space: Space) -> tuple[float, np.ndarray]:
@@ -111,3 +111,15 @@ def alternation(space: Space, pressure: np.ndarray, part: np.ndarray | slice = s
 def mean_density(space: Space, gamma: np.ndarray) -> float:
     """Mean of the nodal relative density over the body."""
     return float(np.einsum("eq,eq->", space.w, space.at_gauss(gamma)) / space.V.sum())
+
+
+def greatest_stretch(space: Space, u: np.ndarray) -> float:
+    """Greatest length of an edge of the body displaced by `u` (n, dim), relative to its undeformed one."""
+    greatest, corners = 1.0, np.arange(2**space.dim)
+    for axis in range(space.dim):
+        ends = [space.conn[:, corners[(corners >> axis & 1) == side]] for side in range(2)]
+        before = space.X[ends[1]] - space.X[ends[0]]
+        after = before + u[ends[1]] - u[ends[0]]
+        square = np.einsum("eai,eai->ea", after, after) / np.einsum("eai,eai->ea", before, before)
+        greatest = max(greatest, float(square.max()) ** 0.5)
+    return greatest

@@ -71,16 +71,17 @@ class Frames(Sequence[meshio.Mesh]):
 
     Attributes
     ----------
-    times: of the frames [s]; numbers of sweeps in a quasi-static run.
+    times: of the frames [s]; numbers of sweeps in a quasi-static run, load times [s] in one that did not fail.
+    name: "run", or "loading" for the frames of the loading.
     moments: frame number of onset, branching, arrival and end, as far as they happened.
     units: of the fields.
     """
 
     units: Mapping[str, str] = FIELD_UNITS
 
-    def __init__(self, folder: Path, moments: Mapping[str, int]) -> None:
-        self.folder, self.moments = folder, dict(moments)
-        self.times = np.array(frame_times(folder / "run.pvd"))
+    def __init__(self, folder: Path, moments: Mapping[str, int], name: str = "run") -> None:
+        self.folder, self.moments, self.name = folder, dict(moments), name
+        self.times = np.array(frame_times(folder / f"{name}.pvd"))
 
     def __len__(self) -> int:
         return len(self.times)
@@ -107,7 +108,7 @@ class Frames(Sequence[meshio.Mesh]):
         if isinstance(key, str) and key not in self.moments:
             raise OutputError(f"{self.folder.parent} has no frame {key!r}; it has {', '.join(self.moments) or 'none'}")
         number = self.moments[key] if isinstance(key, str) else range(len(self))[key]
-        path = self.folder / f"run_{number:04d}.vtu"
+        path = self.folder / f"{self.name}_{number:04d}.vtu"
         said = io.StringIO()
         try:
             with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):  # meshio prints, and exits
@@ -150,6 +151,11 @@ class Run:
         return str(self.parameters.get("analysis", "dynamic"))
 
     @property
+    def verdict(self) -> str:
+        """What became of the run, in one line; empty if it is not finished."""
+        return " | ".join(str(part.summary.get("verdict", "")) for part in self.runs if part.summary)
+
+    @property
     def warnings(self) -> list[str]:
         """What the run warned of."""
         return [str(text) for part in self.runs for text in part.summary.get("warnings", [])]
@@ -179,8 +185,8 @@ class Run:
 
     @cached_property
     def frames(self) -> Frames:
-        """The series of fields."""
-        return Frames(self._own("series"), self.summary.get("moments", {}))
+        """The series of fields of the event; of a run that did not fail those of the loading."""
+        return Frames(self._own("series"), self.summary.get("moments", {}), self.summary.get("series", "run"))
 
     @cached_property
     def deletions(self) -> Deletions:

@@ -20,9 +20,10 @@ import psutil
 
 from .errors import MeshError, SkfsinkError
 from .mesh_files.orientation import oriented
+from .mesh_files.tidy import tidied
 from .meshing import read_mesh
 
-__all__ = ["check_mesh", "one_line", "quietly", "read_mesh_file"]
+__all__ = ["check_indices", "check_mesh", "one_line", "quietly", "read_mesh_file"]
 
 LARGEST = 2 * 10**9        # bytes of a mesh file
 ROOM = (10**9, 30)         # memory to read one [bytes]: at least this, or this many times its size
@@ -56,8 +57,10 @@ def quietly(source: Callable[[], meshio.Mesh], failure: str) -> meshio.Mesh:
         raise MeshError(f"{failure}: {one_line(reason.splitlines()[0])}") from None
 
 
-def read_mesh_file(path: Path) -> meshio.Mesh:
-    """The mesh in a file, checked by :func:`check_mesh`.
+def read_mesh_file(path: Path, raw: bool = False) -> meshio.Mesh:
+    """The mesh in a file, without middle nodes and nodes of no element, checked by :func:`check_mesh`.
+
+    A `raw` one has these nodes, and is only seen to name none that do not exist.
 
     Raises
     ------
@@ -80,7 +83,10 @@ def read_mesh_file(path: Path) -> meshio.Mesh:
     with _room(max(ROOM[0], ROOM[1] * status.st_size)):
         mesh = quietly(lambda: read_mesh(path), failure)
         quietly(lambda: _sound(mesh), failure)
-    check_mesh(shown, mesh)
+    check_indices(shown, mesh)
+    if raw:
+        return mesh
+    check_mesh(shown, tidied(mesh))
     return oriented(mesh)
 
 
@@ -93,13 +99,8 @@ def check_mesh(name: str, mesh: meshio.Mesh) -> None:
         Elements or boundaries name nodes that do not exist, an element has a node twice or is there twice, nodes have
         no finite coordinates, plane elements do not lie in a plane of constant z, or the body is not of a size in mm.
     """
-    points, blocks = mesh.points, mesh.cells
-    for block in blocks:
-        if np.shape(block.data)[1:] != (CORNERS.get(block.type, np.shape(block.data)[-1]),):
-            raise MeshError(f"mesh {name} has elements ({block.type}) with a number of nodes that is not theirs")
-        if not isinstance(block.data, np.ndarray) or block.data.dtype.kind not in "iu" or (
-                block.data.size and not 0 <= block.data.min() <= block.data.max() < len(points)):
-            raise MeshError(f"mesh {name} has elements with nodes that do not exist")
+    check_indices(name, mesh)
+    points = mesh.points
     kind = next((k for k in ("hexahedron", "quad") if len(mesh.cells_dict.get(k, ()))), None)
     if kind is None:
         return  # the sample says what is there instead
@@ -117,6 +118,18 @@ def check_mesh(name: str, mesh: meshio.Mesh) -> None:
     rows = np.ascontiguousarray(nodes).view(np.dtype((np.void, nodes.itemsize * nodes.shape[1]))).ravel()
     if (again := len(rows) - len(np.unique(rows))):
         raise MeshError(f"mesh {name} has {again} element(s) more than once")
+
+
+def check_indices(name: str, mesh: meshio.Mesh) -> None:
+    """See that elements and boundaries name nodes and cells that exist, and elements as many as they have (MeshError).
+    """
+    points, blocks = mesh.points, mesh.cells
+    for block in blocks:
+        if np.shape(block.data)[1:] != (CORNERS.get(block.type, np.shape(block.data)[-1]),):
+            raise MeshError(f"mesh {name} has elements ({block.type}) with a number of nodes that is not theirs")
+        if not isinstance(block.data, np.ndarray) or block.data.dtype.kind not in "iu" or (
+                block.data.size and not 0 <= block.data.min() <= block.data.max() < len(points)):
+            raise MeshError(f"mesh {name} has elements with nodes that do not exist")
     for boundary, members in mesh.cell_sets.items():
         for block, index in zip(blocks, members):
             if index is not None and len(index) and not 0 <= np.min(index) <= np.max(index) < len(block.data):

@@ -132,12 +132,17 @@ def scaled_jacobian(points: Array, quads: Indices) -> Array:
 
 
 def write_mesh(path: str | Path, mesh: meshio.Mesh) -> None:
-    """Write a mesh to a VTU file; a cell set becomes the cell data `boundary:<name>`, 1 on its cells."""
+    """Write a mesh to a VTU file.
+
+    A cell set becomes the cell data `boundary:<name>`, 1 on its cells; a point set the point data of that name.
+    """
     flags = {BOUNDARY_PREFIX + name: [np.isin(np.arange(len(block.data)), index).astype(np.int8)
                                       for block, index in zip(mesh.cells, members, strict=True)]
              for name, members in mesh.cell_sets.items()}
     cells = [(block.type, block.data.astype(np.int32)) for block in mesh.cells]
-    meshio.write(path, meshio.Mesh(mesh.points, cells, cell_data=flags), file_format="vtu")
+    nodes = {BOUNDARY_PREFIX + name: np.isin(np.arange(len(mesh.points)), members).astype(np.int8)
+             for name, members in mesh.point_sets.items()}
+    meshio.write(path, meshio.Mesh(mesh.points, cells, point_data=nodes, cell_data=flags), file_format="vtu")
 
 
 def read_mesh(path: str | Path) -> meshio.Mesh:

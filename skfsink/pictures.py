@@ -9,7 +9,7 @@ import meshio
 import numpy as np
 
 from .output import History
-from .plot import Frame, animation, comparison_picture, density_picture, ledger_picture, speed_picture, tip_picture
+from .plot import Frame, animation, comparison_picture, density_picture, ledger_picture, loading_picture, speed_picture, tip_picture
 from .recorder import Recorder
 from .scene import Scene
 
@@ -36,6 +36,9 @@ def draw_run(scene: Scene, folder: Path, recorder: Recorder) -> None:
     kind = "quasi-static" if quasistatic else f"dynamic, {scene.controls.integrator}"
     title = f"{scene.title}, mesh {scene.sample.name}, {kind}"
     history = History.load(folder / "history.csv")
+    if not recorder.frames:
+        _draw_loading(scene, folder, recorder)
+        return
     frames = [_frame(recorder, i, quasistatic, space.dim) for i in range(len(recorder.frames))]
     keys = sorted(set(recorder.moments.values()))
     if len(keys) < 4:  # too few things happened: add the middle of the event
@@ -49,6 +52,17 @@ def draw_run(scene: Scene, folder: Path, recorder: Recorder) -> None:
         title += f"\n$c_s$, $c_R$ {'in region ' + part.name if part.name else 'outside of the regions'}"
     tip_picture(history, folder / "tip.png", title, np.nan if quasistatic else part.material.shear_wave_speed,
                 np.nan if quasistatic else part.material.rayleigh_wave_speed)
+    animation(space, frames, folder / "animation.gif", view=scene.view)
+
+
+def _draw_loading(scene: Scene, folder: Path, recorder: Recorder) -> None:
+    """`density.png`, `loading.png` and `animation.gif` of a run that did not fail."""
+    space, title = scene.sample.space, f"{scene.title}, mesh {scene.sample.name}: nothing failed"
+    frames = [read_frame(recorder.loading_series.frame(i), np.nan, f"load time {time:.4g} s", space.dim)
+              for i, (time, _) in enumerate(recorder.loading_frames)]
+    keys = sorted({len(frames) // 2, len(frames) - 1})
+    density_picture(space, [frames[k] for k in keys], folder / "density.png", title, scene.view)
+    loading_picture(History.load(folder / "history.csv"), folder / "loading.png", title)
     animation(space, frames, folder / "animation.gif", view=scene.view)
 
 

@@ -28,7 +28,7 @@ from .output import replaced, write_atomic
 from .space import Space
 
 __all__ = ["GAMMA_MAP", "STYLE", "Frame", "animation", "comparison_picture", "density_bar", "density_picture",
-           "draw_body", "ledger_picture", "save_gif", "speed_picture", "tip_picture"]
+           "draw_body", "ledger_picture", "loading_picture", "save_gif", "speed_picture", "tip_picture"]
 
 History = Mapping[str, np.ndarray]  # columns, as `output.History.load` gives them
 
@@ -196,6 +196,22 @@ def _event(history: History) -> tuple[dict[str, np.ndarray], np.ndarray, str, st
     if np.ptp(event["time_s"]) > 0:
         return event, event["time_s"] * 1e6, "time since onset (µs)", unit
     return event, event["step"].astype(float), "sweep", unit
+
+
+@matplotlib.rc_context(STYLE)
+def loading_picture(history: History, path: str | Path, title: str = "") -> None:
+    """Load over displacement while the body is loaded, and the least relative density on the way."""
+    rows = history["phase"] == "loading"
+    x, load, gamma = (history[name][rows] for name in ("grip_displacement_mm", "reaction_N_per_mm", "gamma_min"))
+    figure = Figure((WIDTH / 2 + 0.6, 4.2), layout="constrained")
+    ax, low = figure.subplots(2, 1, sharex=True, height_ratios=[3, 1])
+    unit = "N" if np.isfinite(history["tip_z_mm"]).any() else "N/mm"
+    ax.plot(np.append(0, x), np.append(0, load), "k.-", markersize=3)
+    ax.set_ylabel(f"load ({unit})")
+    low.plot(np.append(0, x), np.append(1, gamma), color=RED)
+    low.set(xlabel="displacement of the grips (mm)", ylabel=r"least $\gamma$", ylim=(0, 1.05))
+    figure.align_ylabels()
+    _save(figure, path, title)
 
 
 @matplotlib.rc_context(STYLE)

@@ -26,8 +26,8 @@ def measured(scene: Scene, recorder: Recorder) -> dict[str, float | None]:
     whole, onset, arrival, tracker = scene.whole, recorder.onset, recorder.at_arrival, recorder.tracker
     dynamic = scene.controls.analysis == "dynamic"
     first = float(tracker.cracked_at.min())
-    return {"onset_load": onset["reaction_N_per_mm"] * whole.load,
-            "onset_displacement": onset["displacement_mm"] * whole.displacement,
+    return {"onset_load": onset["reaction_N_per_mm"] * whole.load if onset else None,
+            "onset_displacement": onset["displacement_mm"] * whole.displacement if onset else None,
             "U": arrival["U_paper"] * whole.energy if arrival else None,
             "D": arrival["D_sink"] * whole.energy if arrival else None,
             "arrival_time": tracker.arrival - first if dynamic and tracker.arrival is not None else None,

@@ -12,6 +12,7 @@ from .density import DensitySolver
 from .gauge import Gauge
 from .guards import Guard
 from .loading import Loading
+from .material_point import mean_deformation, mean_stress
 from .momentum import Momentum
 from .output import History, Series, prepare_folder, write_atomic
 from .scene import Scene
@@ -31,8 +32,11 @@ class Recorder:
     tracker: the crack.   tips: the crack at the last record.   guard: watches the run.
     moments: frame number of each key moment: onset, branching, arrival, end.
     onset, at_arrival: figures noted at those moments.
+    greatest: load, displacement, mean deformation gradient F and nominal stress P where the load was greatest while the body was loaded.
+    loading_frames: time and label of the frames of the loading.
     """
 
+    LOADING_FRAMES = 50.0  # of the way of the loading: frames are at least that part of it apart
     RARER = 50.0  # times the interval of rows and frames, while a body from rest has not cracked
 
     def __init__(self, scene: Scene, folder: Path, momentum: Momentum, density: DensitySolver,
@@ -48,30 +52,57 @@ class Recorder:
         if memory is None:
             prepare_folder(folder / "series", overwrite=True)
         self.series = Series(folder / "series", "run", space)
+        self.loading_series = Series(folder / "series", "loading", space)
         self.tips: Tips = self.tracker.look(0.0, np.ones(space.n_nodes))
         self.tracker.track.clear()
         memory = memory or {"rows": [], "frames": [], "moments": {}, "onset": {}, "at_arrival": {}}
+        self.loading_frames: list[tuple[float, str]] = [(float(t), "") for t, _ in memory.get("loading_frames", ())]
+        self._framed = float(memory.get("framed", 0.0))
+        self.greatest: dict[str, Any] = dict(memory.get("greatest", {}))
         self.frames: list[tuple[float, str]] = [(float(t), str(label)) for t, label in memory["frames"]]
         self.moments: dict[str, int] = dict(memory["moments"])
         self.onset: dict[str, float] = dict(memory["onset"])
         self.at_arrival: dict[str, float] = dict(memory["at_arrival"])
         self.separated_at = float(memory.get("separated_at", np.inf))   #: first record after the separation [s]
         self.series.resume(len(self.frames))  # this may refuse, before any file is touched
+        self.loading_series.resume(len(self.loading_frames))
         self.history = History(folder / "history.csv", memory["rows"], space.dim)
         self._marked: np.ndarray | None = None  # gamma when the tracker last looked; a solve makes a new array
         self.gauge = Gauge(scene, loading)
         controls = scene.controls
         quasistatic = controls.analysis == "quasistatic"
         self.guard = Guard(scene, momentum)
-        self.guard.scale = self.onset.get("elastic_energy", 0.0)
+        self.guard.scale, self.guard.evenness = (self.onset.get(name, 0.0) for name in ("elastic_energy", "evenness"))
         self._waiting = controls.start == "rest"
         self._record_every = 1.0 if quasistatic else controls.record_every
         self._frame_every = 10.0 if quasistatic else controls.frame_every
 
     # --- loading ---
-    def loading(self, state: State, reaction: np.ndarray) -> None:
-        """Row of a load increment."""
-        self.history.append(self._row(state, reaction, self.tips, 0.0))
+    def loading(self, state: State, reaction: np.ndarray, way: float = 0.0) -> None:
+        """Row of a load increment, and a frame where the `way` of the loading (in largest increments) asks for one."""
+        row = self._row(state, reaction, self.tips, 0.0)
+        self.history.append(row)
+        load = row["reaction_N_per_mm"]
+        if load > self.greatest.get("load", -np.inf):
+            self.greatest = {"load": load, "displacement_mm": row["grip_displacement_mm"],
+                             "F": mean_deformation(self.momentum, state.u).tolist(),
+                             "P": mean_stress(self.momentum.space, reaction).tolist()}
+        if way >= self._framed + max(1.0, self._framed / self.LOADING_FRAMES):
+            self._framed = way
+            self.loading_frame(state)
+
+    def loading_frame(self, state: State) -> None:
+        """Add the state to the series of the loading."""
+        self.loading_frames.append((state.time, ""))
+        self._add(self.loading_series, state)
+
+    def unfailed(self, state: State) -> None:
+        """Last frame of a run that ends without a failure."""
+        if not self.loading_frames or self.loading_frames[-1][0] != state.time:
+            self.loading_frame(state)
+        self.loading_frames[-1] = (state.time, "end")
+        self.moments = {"end": len(self.loading_frames) - 1}
+        self._close(state)
 
     def reached_onset(self, state: State, reaction: np.ndarray) -> None:
         """Note the onset."""
@@ -81,6 +112,7 @@ class Recorder:
                       "loading_balance": state.ledger.balance}
         self.guard.scale = state.ledger.elastic
         self.guard.check_onset(state)
+        self.onset["evenness"] = self.guard.evenness
 
     def load(self, reaction: np.ndarray) -> float:
         """The load that is reported, see :class:`.Gauge` [N; N/mm in 2D]."""
@@ -124,18 +156,25 @@ class Recorder:
         """Last row and frame, and the log of deleted elements."""
         self._record(state, reaction, dt)
         self.frame(state, "end")
+        self._close(state)
+
+    def _close(self, state: State) -> None:
         self.series.flush()
+        self.loading_series.flush()
         log = "".join(f"{time!r},{element}\n" for time, element in state.deletions)
         write_atomic(self.history.path.with_name("deletions.csv"), "time_s,element\n" + log)
 
     def frame(self, state: State, label: str) -> None:
         """Add the state to the ParaView series."""
-        momentum, space = self.momentum, self.scene.sample.space
         if label:
             self.moments[label] = len(self.frames)
         self.frames.append((state.time, label))
+        self._add(self.series, state)
+
+    def _add(self, series: Series, state: State) -> None:
+        momentum, space = self.momentum, self.scene.sample.space
         stress = cauchy_stress(momentum, state.u)
-        self.series.add(
+        series.add(
             state.time,
             {"displacement": state.u, "velocity": state.v, "gamma": state.gamma},
             {"deleted": state.deleted.astype(np.int8), "W": space.element_mean(np.minimum(momentum.W, 1e3)),
@@ -169,5 +208,7 @@ class Recorder:
     def memory(self) -> dict[str, Any]:
         """What goes into a checkpoint as JSON; the tracker's arrays go beside it."""
         self.series.flush()  # a checkpoint names its frames
-        return {"rows": self.history.rows, "frames": self.frames, "moments": self.moments, "onset": self.onset,
+        self.loading_series.flush()
+        return {"rows": self.history.rows, "frames": self.frames, "loading_frames": self.loading_frames,
+                "framed": self._framed, "greatest": self.greatest, "moments": self.moments, "onset": self.onset,
                 "at_arrival": self.at_arrival, "separated_at": self.separated_at}

@@ -10,11 +10,13 @@ from typing import Any
 
 import numpy as np
 
+from .material_point import beside_theory
 from .output import versions
 from .quantities import measured
 from .scene import Scene
 from .simulate import Simulation
 from .state import State
+from .verdict import greatest_ratio, verdict
 
 __all__ = ["SCHEMA", "Result", "summarize"]
 
@@ -41,6 +43,11 @@ class Result:
     state: State
     parts: dict[str, Result]
 
+    @property
+    def failed(self) -> bool:
+        """Whether the body has failed at all; without a failure there is no event."""
+        return all(part.failed for part in self.parts.values()) if self.parts else self.summary["series"] == "run"
+
 
 def peak_rss_mb() -> float:
     """Greatest memory this process has used [MB]."""
@@ -49,35 +56,49 @@ def peak_rss_mb() -> float:
 
 
 def summarize(scene: Scene, simulation: Simulation) -> dict[str, Any]:
-    """Summary of a finished run."""
+    """Summary of a finished run; figures of the onset and of the event are null in one that did not fail."""
     state, recorder = simulation.state, simulation.recorder
     ledger, onset, tracker = state.ledger, recorder.onset, recorder.tracker
     space, cost = scene.sample.space, simulation.cost()
     dynamic = scene.controls.analysis == "dynamic"
-    scale = onset["elastic_energy"]
     balances = [abs(row["balance"]) for row in recorder.history.rows if row["phase"] != "loading"]
+    ratio, place = greatest_ratio(simulation.density, state)
     return {
         "schema": SCHEMA, "case": scene.case, "mesh": scene.sample.name, "analysis": scene.controls.analysis,
-        "integrator": scene.controls.integrator if dynamic else None,
+        "integrator": scene.controls.integrator if dynamic else None, "verdict": verdict(scene, simulation),
         "elements": space.n_elements, "dofs": int(simulation.free.sum()) + space.n_nodes,
         "unknowns": {"displacement": int(simulation.free.sum()), "density": space.n_nodes},
-        "onset": {k: onset[k] for k in ("displacement_mm", "reaction_N_per_mm", "elastic_energy", "gamma_min")},
+        "loading": {"greatest_load": recorder.greatest.get("load"),
+                    "displacement_at_greatest_load_mm": recorder.greatest.get("displacement_mm"),
+                    "greatest_W_over_phi": ratio, "place_of_greatest_W_over_phi_mm": place},
+        "material_point": _material_point(scene, simulation),
+        "onset": {k: onset.get(k) for k in ("displacement_mm", "reaction_N_per_mm", "elastic_energy", "gamma_min")},
         "event": {"first_arrival_s": tracker.arrival if dynamic else None,
                   "first_arrival_sweep": None if dynamic else tracker.arrival,
                   "mean_tip_speed_m_per_s": tracker.mean_speed() if dynamic else None,
                   "max_branches": tracker.max_branches, "separated": tracker.separated,
-                  "duration_s": state.time if dynamic else None},
+                  "duration_s": state.time if dynamic and onset else None},
         "energy": {"U_paper_at_arrival": recorder.at_arrival.get("U_paper"), "U_paper_final": ledger.paper,
                    "D_sink_at_arrival": recorder.at_arrival.get("D_sink"), "D_sink_final": ledger.sink,
                    "D_sink_stored": ledger.sink_stored, "D_sink_kinetic": ledger.sink_kinetic,
                    "initial": ledger.initial, "elastic_final": ledger.elastic, "kinetic_final": ledger.kinetic,
-                   "external_work": onset["work"] + ledger.work, "deletion": ledger.deletion,
+                   "external_work": onset.get("work", 0.0) + ledger.work, "deletion": ledger.deletion,
                    "numerical": ledger.numerical, "released": ledger.released,
-                   "balance_error_relative": max(balances, default=0.0) / scale},
+                   "balance_error_relative": max(balances, default=0.0) / onset["elastic_energy"] if onset else None},
         "quantities": measured(scene, recorder), "model": dict(scene.choice) or None,
         "whole": {"energy": scene.whole.energy, "load": scene.whole.load, "displacement": scene.whole.displacement},
         "deleted_elements": int(state.deleted.sum()), "warnings": simulation.notes.texts,
+        "notes": list(scene.sample.notes),
         "cost": {"wall_s": {k: round(v, 3) for k, v in cost["wall"].items()}, "steps": cost["steps"],
                  "gamma_solves": cost["gamma_solves"], "factorisations": cost["factorisations"],
                  "peak_rss_mb": round(peak_rss_mb(), 1)},
-        "versions": versions(), "assumed": list(scene.assumed), "moments": recorder.moments}
+        "versions": versions(), "assumed": list(scene.assumed), "moments": recorder.moments,
+        "series": "loading" if simulation.unfailed else "run"}
+
+
+def _material_point(scene: Scene, simulation: Simulation) -> dict[str, Any] | None:
+    """Strength beside theory of a body that was loaded evenly."""
+    greatest, guard = simulation.recorder.greatest, simulation.recorder.guard
+    if guard.evenness < guard.EVEN[1] or "F" not in greatest or scene.tractions:
+        return None
+    return beside_theory(scene, np.array(greatest["F"]), np.array(greatest["P"]))

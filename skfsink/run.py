@@ -94,8 +94,8 @@ def read_scene(folder: Path) -> Scene:
         case = str(tomllib.loads(path.read_text(encoding="utf-8"))["case"])
         module = importlib.import_module(f"skfsink.cases.{case}")
         stored = read_parameters(folder, case)
-        own = {name: stored.pop(name) for name in inspect.signature(getattr(module, case)).parameters
-               if name != "options"}
+        own = {name: stored.pop(name, p.default)
+               for name, p in inspect.signature(getattr(module, case)).parameters.items() if name != "options"}
         options = replace(Options(), **stored, corridor=_corridor(folder))
     except (ModuleNotFoundError, UnicodeDecodeError, tomllib.TOMLDecodeError, AttributeError, KeyError,
             TypeError) as error:
@@ -136,7 +136,7 @@ def _resumed(case: str, own: dict[str, Any], defaults: dict[str, Any],
                                  f"({stored.get(name)}); a resumed run keeps its scene")
     known = {f.name for f in fields(Options)} - set(NOT_PHYSICS)
     try:
-        own = {k: stored.pop(k) for k in own}
+        own = {k: stored.pop(k, defaults[k]) for k in own}
         if unknown := stored.keys() ^ known:
             raise KeyError(*sorted(unknown))
     except KeyError as error:
@@ -169,9 +169,11 @@ def _run_both(scene: Scene, folder: Path, display: Display, resume: bool, note: 
         if not begun[analysis]:
             _begin(folder / analysis, overwrite=True)
         parts[analysis] = _run_one(part, folder / analysis, display, begun[analysis], onset, note)
-        onset = load_state(folder / "dynamic" / Simulation.ONSET, scenes["dynamic"].fingerprint)
+        if parts[analysis].failed:
+            onset = load_state(folder / "dynamic" / Simulation.ONSET, scenes["dynamic"].fingerprint)
     display.phase("output")
-    draw_comparison(parts["dynamic"], parts["quasistatic"], folder)
+    if all(part.failed for part in parts.values()):
+        draw_comparison(parts["dynamic"], parts["quasistatic"], folder)
     first = parts["dynamic"]
     summary = {"schema": first.summary["schema"], "case": scene.case, "mesh": first.summary["mesh"], "analysis": "both",
                **{name: part.summary for name, part in parts.items()}}
@@ -190,6 +192,8 @@ def _run_one(scene: Scene, folder: Path, display: Display, resume: bool, onset: 
         simulation.checkpoint()  # from here on the run can be resumed, whenever it is killed
         write_atomic(folder / SCENE, scene.toml())
     space = scene.sample.space
+    for text in scene.sample.notes:
+        display.say(f"note: {text}")
     display.say(f"{scene.title}, mesh {scene.sample.name}: {space.n_elements} elements, {int(simulation.free.sum())} + "
                 f"{space.n_nodes} unknowns; {scene.controls.analysis} analysis in {folder}")
     state = simulation.run(None if onset is None else onset_copy(onset))
@@ -202,4 +206,5 @@ def _run_one(scene: Scene, folder: Path, display: Display, resume: bool, onset: 
     summary = {**summarize(scene, simulation), **corridor}
     write_summary(folder / SUMMARY, summary)
     display.update(1.0, str(folder))
+    display.say(summary["verdict"])
     return Result(folder, scene, summary, History.load(folder / "history.csv"), state, {})

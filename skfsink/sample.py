@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import shlex
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -14,7 +15,9 @@ import skfem
 from skfem.io.meshio import INV_HEX_MAPPING
 
 from .errors import MeshError, ParameterError, require
-from .mesh_file import one_line, quietly, read_mesh_file
+from .mesh_file import check_mesh, one_line, quietly, read_mesh_file
+from .mesh_files.pieces import check_one_piece, hinges, merged
+from .mesh_files.tidy import notes_of, place
 from .meshing import read_mesh
 from .shapes import SHAPES
 from .space import Space
@@ -35,6 +38,7 @@ class Sample:
     space: spaces on it.
     boundaries: nodes of each named boundary, ascending.
     cells: numbers of the elements of each named set, ascending.
+    notes: what was done to the mesh of a file while it was read, one line each.
     made: whether the mesh was made by gmsh, and is not a file of the user's or a committed one.
     """
 
@@ -43,6 +47,7 @@ class Sample:
     boundaries: Mapping[str, np.ndarray]
     made: bool = False
     cells: Mapping[str, np.ndarray] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
     def nodes(self, boundary: str) -> np.ndarray:
         """Nodes of a named boundary.
@@ -52,7 +57,8 @@ class Sample:
         MeshError
             The mesh has no such boundary.
         """
-        return _named(self.boundaries, boundary, f"mesh {self.name} has no boundary {boundary!r}")
+        why = "".join(f" ({note})" for note in self.notes if note.startswith(f"the boundary {boundary!r} "))
+        return _named(self.boundaries, boundary, f"mesh {self.name} has no boundary {boundary!r}{why}")
 
     def elements(self, name: str) -> np.ndarray:
         """Elements of a named set.
@@ -116,11 +122,11 @@ def load_sample(case: str, mesh: str, make: Callable[[], meshio.Mesh] | None = N
         return _from_meshio(mesh, lift(quietly(lambda: read_mesh(path), f"the mesh file {path} cannot be read")))
     if not Path(mesh).suffix:
         raise MeshError(f"mesh must be one of {', '.join(known)}, or the path of a mesh file; got {mesh!r}")
-    return _from_meshio(mesh, read_mesh_file(Path(mesh)))
+    return _from_file(Path(mesh))
 
 
-def file_sample(path: Path) -> Sample:
-    """The sample in a mesh file, whose sides have names.
+def file_sample(path: Path, merge_nodes: float = 0.0) -> Sample:
+    """The sample in a mesh file, whose sides have names; nodes within `merge_nodes` [mm] of each other become one.
 
     A boundary that the mesh does not name itself may be called `left` or `right` (nodes of least and greatest x),
     `bottom` or `top` (y), `back` or `front` (z).
@@ -130,7 +136,7 @@ def file_sample(path: Path) -> Sample:
     MeshError
         As of :func:`load_sample`.
     """
-    sample = _from_meshio(str(path), read_mesh_file(path))
+    sample = _from_file(path, merge_nodes)
     X = sample.space.X
     near = SIDE * float(np.ptp(X, axis=0).max())
     sides = {}
@@ -187,6 +193,23 @@ def _as_it_is(mesh: meshio.Mesh) -> meshio.Mesh:
     return mesh
 
 
+def _from_file(path: Path, merge_nodes: float = 0.0) -> Sample:
+    """The sample in a mesh file, in one piece."""
+    name = one_line(str(path))
+    data = read_mesh_file(path)
+    if merge_nodes:
+        check_mesh(name, merged(name, data, merge_nodes))
+    sample = _from_meshio(str(path), data)
+    check_one_piece(sample.name, shlex.quote(name), sample.space)
+    if len(nodes := hinges(sample.space)):
+        what = "node" if sample.space.dim == 2 else "node or edge"
+        note = (f"parts of the body hang together by a single {what}, at {len(nodes)} node(s), such as "
+                f"{place(sample.space.X[nodes[0]])} mm: a hinge, or a crack that goes too far; if it is not meant, "
+                f"mend the mesh there")
+        sample = replace(sample, notes=(*sample.notes, note))
+    return sample
+
+
 def _from_meshio(name: str, data: meshio.Mesh, made: bool = False) -> Sample:
     shown = one_line(name)
     present = [kind for kind in _CELLS if kind in data.cells_dict]
@@ -206,7 +229,7 @@ def _from_meshio(name: str, data: meshio.Mesh, made: bool = False) -> Sample:
         space = Space(mesh_class(np.ascontiguousarray(points.T), np.ascontiguousarray(connectivity.astype(np.int64))))
     except MeshError as error:
         raise MeshError(f"mesh {shown}: {error}") from None
-    return Sample(Path(name).stem, space, _boundaries(data, facet), made, _elements(data, kind))
+    return Sample(Path(name).stem, space, _boundaries(data, facet), made, _elements(data, kind), notes_of(data))
 
 
 def _elements(data: meshio.Mesh, kind: str) -> dict[str, np.ndarray]:

@@ -85,7 +85,8 @@ class Simulation:
     # --- the phases ---
     def run(self, onset: State | None = None) -> State:
         """Run to the end from where the state is; `onset` is a state already loaded to the onset."""
-        with Interrupt() as interrupt, self.notes, one_thread_of_openblas(), closing(self.recorder.series):
+        with Interrupt() as interrupt, self.notes, one_thread_of_openblas(), closing(self.recorder.series), \
+                closing(self.recorder.loading_series):
             self._interrupt = interrupt
             if self.state.phase == "loading":
                 self.recorder.guard.check_scene()
@@ -93,7 +94,11 @@ class Simulation:
                     self._load()
                 else:
                     self._adopt(onset)
-                self._begin_event()
+                if self.unfailed:
+                    self.recorder.unfailed(self.state)
+                    self.state.phase = "done"
+                else:
+                    self._begin_event()
             if self.state.phase == "event":
                 self.display.phase(self.scene.controls.analysis)
                 if self.scene.controls.analysis == "quasistatic":
@@ -107,6 +112,16 @@ class Simulation:
                 raise Interrupted("interrupted")
         return self.state
 
+    @property
+    def unfailed(self) -> str:
+        """Why the loading ended without a failure; empty where there was one, or it still goes on."""
+        return "" if self._from_rest else self.statics.unfailed
+
+    @property
+    def dissolved(self) -> bool:
+        """Whether a body that was loaded evenly has failed everywhere at once."""
+        return self.recorder.guard.dissolved
+
     def _load(self) -> None:
         self.display.phase("loading")
         state = self.state
@@ -117,15 +132,17 @@ class Simulation:
         loading: LoadingFromRest | Statics = self._from_rest or self.statics
         for _ in loading.load(state):
             reaction = self.momentum.force(state.u)
-            self.recorder.loading(state, reaction)
+            self.recorder.loading(state, reaction, self.statics.way(state.grip))
             started = True
             done = 0.5 * min(1.0, tolerance * state.grip / (loading.increment or np.inf)) ** 0.25
             self.display.update(done, f"grips {self.recorder.gauge.displacement(state):.4f} mm  load "
                                       f"{self.recorder.load(reaction):.4f} N/mm  least γ {state.gamma.min():.3f}")
             self._pause("loading")
+        self._lap("loading")
+        if self.unfailed:
+            return
         if started or not self.recorder.onset:
             self.recorder.reached_onset(state, self.momentum.force(state.u))
-        self._lap("loading")
         save_state(self.folder / self.ONSET, self.scene.fingerprint, state)
 
     def _adopt(self, onset: State) -> None:
@@ -185,6 +202,8 @@ class Simulation:
             before = state.time
             if recorder.tracker.separated and state.time >= recorder.separated_at + self.scene.controls.aftermath:
                 break
+            if self.dissolved:
+                break
             if cracked == np.inf and recorder.tips.branches:
                 cracked = float(recorder.tracker.cracked_at.min())
             if state.time >= cracked + self.scene.controls.event_time:
@@ -202,7 +221,7 @@ class Simulation:
             if recorder.watch(state, self.momentum.force(state.u), before, 0.0):
                 self._show(state, 0.0, f"sweep {state.step}")
             before = state.time
-            if recorder.tracker.separated and (self.statics.settled or state.ledger.elastic < 1e-4 * scale):
+            if self.dissolved or recorder.tracker.separated and (self.statics.settled or state.ledger.elastic < 1e-4 * scale):
                 break
             self._pause("event")
         recorder.finish(state, self.momentum.force(state.u), 0.0)
@@ -245,8 +264,7 @@ class Simulation:
 
     def checkpoint(self) -> None:
         """Write the checkpoint."""
-        memories = {"tracker": self.recorder.tracker.memory(), "statics": self.statics.memory(),
-                    "density": self.density.memory()}
+        memories = {"tracker": self.recorder.tracker.memory(), "statics": self.statics.memory()}
         if self.integrator is not None:
             self.integrator.sync(self.state)
             memories["integrator"] = self.integrator.memory()
@@ -257,7 +275,6 @@ class Simulation:
         self.state = state
         self.recorder.tracker.restore(memories["tracker"])
         self.statics.restore(memories["statics"])
-        self.density.restore(memories.get("density", {}))
         cost = extra["cost"]
         self.wall.update(cost.pop("wall"))
         self.counts.update(cost)
@@ -275,5 +292,5 @@ def onset_copy(state: State) -> State:
     """An independent copy of a loaded state, to start another analysis from."""
     return dataclasses.replace(
         state, u=state.u.copy(), v=state.v.copy(), a=state.a.copy(), gamma=state.gamma.copy(),
-        W_max=state.W_max.copy(), deleted=state.deleted.copy(), deletions=list(state.deletions),
+        W_max=state.W_max.copy(), sink=None if state.sink is None else state.sink.copy(), deleted=state.deleted.copy(), deletions=list(state.deletions),
         ledger=dataclasses.replace(state.ledger))

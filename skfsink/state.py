@@ -20,6 +20,7 @@ class State:
     ----------
     u, v, a: displacement [mm], velocity [mm/s], acceleration [mm/s^2] of the nodes, (n, dim).
     gamma: relative density of the nodes, (n,).
+    sink: coefficients 1/(H + eps) that gamma was solved with, (ne, nq); None if gamma is to be solved anew.
     W_max: greatest stored energy each Gauss point has seen [MPa], (ne, nq); H follows from it (Eq. 10).
     deleted: failed elements, (ne,) bool.
     deletions: the ordered log (time, element).
@@ -36,6 +37,7 @@ class State:
     gamma: np.ndarray
     W_max: np.ndarray
     deleted: np.ndarray
+    sink: np.ndarray | None = None
     deletions: list[tuple[float, int]] = field(default_factory=list)
     grip: float = 0.0
     time: float = 0.0

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from .deletion import delete_failed
+from .density import Density
 from .errors import ConvergenceError
 from .onset import StaticLoading, StaticsControls
 from .state import State
@@ -23,23 +24,27 @@ class Statics(StaticLoading):
 
     SNAP = 400  # Newton steps in a sweep: the body may snap to a shape far away
 
+    IDLE = 100  # sweeps that change nothing while points wait, after which a run is given up
+
     settled = False  #: whether the last sweep of `propagate` found nothing left to change
+    arrested = ""    #: why `propagate` has ended although the caller would have gone on; empty while it has not
 
     def propagate(self, state: State, advance: float = 0.005, limit: float = 10.0) -> Iterator[State]:
         """Let the crack run through equilibria, yielding after each sweep; the caller stops when it has crossed.
 
         A sweep: equilibrium at fixed gamma (the energy it gives up is `released`), then the history, gamma and the
         deletions at fixed displacement (what they take is D). Grips and dead loads stand still while the crack runs;
-        where it arrests, `settled` is set, and the next sweep moves them on by `advance` of their way so far.
+        where it arrests, `settled` is set, and the next sweep moves them on by `advance` of their way so far. It ends
+        where the crack has not crossed at `limit` times the way of the start, or when nothing moves any more; `arrested`
+        then says which.
 
         Raises
         ------
         ConvergenceError
-            The crack has not crossed at `limit` times the way of the start, or when nothing moves any more; or there is
-            no equilibrium, as under dead loads alone.
+            There is no equilibrium, as under dead loads alone; or points wait that are never let go.
         """
         ledger, dead = state.ledger, self.momentum.dead
-        furthest = limit * self._path(state.grip)
+        furthest, idle = limit * self.way(state.grip), 0
         self.momentum.set_time(state.grip)
         if state.step == 0:
             self.momentum.set_gamma(state.gamma, state.deleted)
@@ -50,19 +55,23 @@ class Statics(StaticLoading):
             self.momentum.set_gamma(state.gamma, state.deleted)
             self.momentum.force(state.u)
             if self.settled:
-                self._advance(state, advance)
-                if self._path(state.grip) > furthest:
-                    raise ConvergenceError(f"the crack has not crossed the sample at {limit:g} times the onset load")
+                if not self._advance(state, advance):
+                    self.arrested = f"nothing moves after load time {state.grip:.4g} s"
+                    return
+                if self.way(state.grip) > furthest:
+                    self.arrested = f"the grips are at {limit:g} times their way to the onset"
+                    return
             else:
                 before = self.momentum.potential
                 state.u = self._relax(state)
                 ledger.released += before - self.momentum.potential
             W, loads = self.momentum.W, None if dead is None else dead.values
             postponed = self._follow(state, W)
-            gamma = self.density.solve(state.W_max, state.gamma)
+            new = self.density.update(state.W_max, Density(state.gamma, state.sink))
+            gamma = new.gamma
             change = float(np.abs(gamma - state.gamma).max())
             old = self.momentum.gamma
-            state.gamma = gamma
+            state.gamma, state.sink = gamma, new.sink
             state.step += 1
             state.time = float(state.step)
             undeleted = self.momentum.effective(gamma, state.deleted)
@@ -75,6 +84,10 @@ class Statics(StaticLoading):
             ledger.deletion += float(np.einsum("eq,eq,eq->", self.space.w, W, undeleted - self.momentum.gamma))
             ledger.elastic = float(np.einsum("eq,eq,eq->", self.space.w, W, self.momentum.gamma))
             self.settled = change <= self.controls.gamma_tolerance and not postponed
+            idle = idle + 1 if postponed and change <= self.controls.gamma_tolerance else 0
+            if idle > self.IDLE:
+                raise ConvergenceError(f"the last {idle} sweeps have changed nothing, while points past the energy "
+                                       f"limiter wait for others: lower --front (now {self.controls.front:g})")
             yield state
 
     def _relax(self, state: State) -> np.ndarray:
@@ -91,20 +104,30 @@ class Statics(StaticLoading):
         Points past the energy limiter wait while another one is much further past it: once that has failed and forces
         have found their new ways, most of them are relieved. How far is W/Phi, with the limiter of each material.
         """
-        ratio = W / self.density.phi
-        most = float(ratio[self.momentum.gamma > 0].max(initial=0.0))
-        waiting = (ratio > 1) & (self.controls.front * most > ratio) & (state.W_max < W)
+        ratio, live = W / self.density.phi, self.momentum.gamma > 0
+        past = (ratio > 1) & (state.W_max < W)
+        waiting = past & (self.controls.front * float(ratio[live].max(initial=0.0)) > ratio)
+        if waiting.any() and not self._fails(state, np.where(past & ~waiting, W, state.W_max)):
+            most = float(ratio[waiting & live].max(initial=0.0))  # the one they wait for has failed long ago
+            waiting &= self.controls.front * most > ratio
         state.W_max = np.where(waiting, state.W_max, np.maximum(state.W_max, W))
         return bool(waiting.any())
 
-    def _advance(self, state: State, share: float) -> None:
-        """Let grips and dead loads go on by a `share` of their way at fixed gamma, to the new equilibrium."""
+    def _fails(self, state: State, W_max: np.ndarray) -> bool:
+        """Whether the sink grows anywhere if the history of `state` goes on to `W_max` (ne, nq)."""
+        before, after = map(self.density.coefficients, (state.W_max, W_max))
+        return bool((after > (1 + self.density.unchanged) * before).any())
+
+    def _advance(self, state: State, share: float) -> bool:
+        """Let grips and dead loads go on by a `share` of their way at fixed gamma, to the new equilibrium.
+
+        False if nothing moves any more.
+        """
         held, dead = ~self.free.reshape(state.u.shape), self.momentum.dead
         while self._longest(state.grip) == np.inf:
             knot = self.loading.knot(state.grip)
             if knot == np.inf:
-                raise ConvergenceError(f"the crack is arrested, and nothing moves any more after load time "
-                                       f"{state.grip:.4g} s: let a ramp go further")
+                return False
             state.grip = knot
         force = self.momentum.force(state.u)
         increment = share * self._age(state.grip)
@@ -117,6 +140,7 @@ class Statics(StaticLoading):
         if dead is not None and before is not None:
             state.ledger.work += dead.changed(before, 0.5 * (state.u + u))
         state.u, state.grip = u, end
+        return True
 
     # --- checkpoints ---
     def memory(self) -> dict[str, np.ndarray]:

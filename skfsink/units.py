@@ -13,7 +13,7 @@ __all__ = ["UNITS", "in_unit", "number_in"]
 #: unit of each parameter that has one; the other numbers are pure
 UNITS = {
     **dict.fromkeys(("side", "notch", "notch_width", "offset", "length", "gauge_length", "gauge_width", "grip_width",
-                     "fillet", "thickness", "inner_radius", "length_scale"), "mm"),
+                     "fillet", "thickness", "inner_radius", "length_scale", "merge_nodes"), "mm"),
     **dict.fromkeys(("c1", "c2", "bulk_modulus", "phi"), "MPa"),
     "density": "kg/m^3",
     "speed": "mm/s",

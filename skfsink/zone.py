@@ -23,11 +23,18 @@ from scipy.sparse import csr_array
 from .amg import AmgCG, residual
 from .direct import unsigned
 
-__all__ = ["ActiveZone"]
+__all__ = ["ActiveZone", "Zone"]
 
 
-class _Zone(NamedTuple):
-    """Depth of each cell [mm], zero outside; the nodes, ascending; the solver of their part of the system."""
+class Zone(NamedTuple):
+    """A zone.
+
+    Attributes
+    ----------
+    depth: of each cell [mm], zero outside.
+    nodes: those in it, ascending.
+    inner: the solver of their part of the system.
+    """
 
     depth: np.ndarray
     nodes: np.ndarray
@@ -37,6 +44,8 @@ class _Zone(NamedTuple):
 class ActiveZone:
     """Solves  A x = b  where the residual of the guess is, and checks the solution everywhere.
 
+    Zones are handed in and out: which ones a solve finds is the caller's affair, and no solve depends on another.
+
     Parameters
     ----------
     X: nodal coordinates [mm], (n, dim).
@@ -45,7 +54,6 @@ class ActiveZone:
 
     Attributes
     ----------
-    nodes: the nodes of the zone of the last solve, ascending; none before the first one.
     solves: those made in zones.   misses: solutions in a zone whose residual outside was too large.
     choices: how often a zone was chosen anew.
     residual: relative residual of the whole system after the last solve.
@@ -65,69 +73,57 @@ class ActiveZone:
         width = self.CELL * length_scale
         cells, cell = np.unique(np.floor(X / width), axis=0, return_inverse=True)
         self._centres, self._cell = width * np.ascontiguousarray(cells), cell.ravel()
-        self._zones: list[_Zone] = []  # the one used last at the end
-        self.nodes = np.zeros(0, np.int64)
         self.solves = self.misses = self.choices = 0
         self.residual = 0.0
 
-    def solve(self, A: csr_array, D: np.ndarray, b: np.ndarray, x: np.ndarray,
-              tolerance: float) -> tuple[np.ndarray, bool, int]:
-        """The solution from the guess `x` (see :meth:`.AmgCG.solve`), whether it meets the target, and iterations.
+    def solve(self, A: csr_array, D: np.ndarray, b: np.ndarray, x: np.ndarray, tolerance: float,
+              zones: tuple[Zone, ...] = ()) -> tuple[np.ndarray, bool, int, tuple[Zone, ...]]:
+        """The solution from the guess `x` (see :meth:`.AmgCG.solve`), whether it meets the target, iterations, zones.
 
-        One that does not is the best guess for a solve everywhere.
+        One that does not is the best guess for a solve everywhere. `zones` are those of the solves before, the one
+        used last at the end; so are those returned.
         """
         size, x, r = float(np.linalg.norm(b)), x.copy(), residual(A, x, b)
         _settle(self._amg.dead(D), D, *unsigned(A), x, r)
         self.residual = float(np.linalg.norm(r)) / size
         if self.residual <= tolerance:
-            return x, True, 0
+            return x, True, 0, zones
         total = 0
         for _ in range(self.PASSES):
-            zone = self._find(r, tolerance * size)
+            zone = self._find(r, tolerance * size, zones)
             if zone is None:
-                return x, False, total
+                return x, False, total, zones
+            zones = (*[other for other in zones if other is not zone][-self.KEPT + 1:], zone)
             converged = zone.inner.iterate(A, D, r, x, self.SHARE * tolerance * size)
             total += zone.inner.iterations
             if not converged:
-                return x, False, total
+                return x, False, total, zones
             r = residual(A, x, b)
             self.residual = float(np.linalg.norm(r)) / size
             if self.residual <= 2 * tolerance:
                 self.solves += 1
-                return x, True, total
+                return x, True, total, zones
             self.misses += 1
-        return x, False, total
+        return x, False, total, zones
 
-    def _find(self, r: np.ndarray, target: float) -> _Zone | None:
-        """The smallest zone kept that is deep enough for the residual `r`, or a new one; None if that is too large."""
+    def _find(self, r: np.ndarray, target: float, zones: tuple[Zone, ...]) -> Zone | None:
+        """The smallest of `zones` that is deep enough for the residual `r`, or a new one; None if that is too large."""
         need = np.zeros(len(self._centres))
         _reach(r, self._cell, target, self.RADIUS * self._l, self.DECADE * self._l, need)
-        fit = [zone for zone in self._zones if (zone.depth >= need).all()]
+        fit = [zone for zone in zones if (zone.depth >= need).all()]
         if fit:
-            zone = min(fit, key=lambda zone: zone.nodes.size)
-            self._zones = [other for other in self._zones if other is not zone]
-        else:
-            depth = np.zeros_like(need)
-            _deepen(self._centres, np.flatnonzero(need), need, self.MARGIN * self._l, depth)
-            nodes = np.flatnonzero(depth[self._cell])
-            if nodes.size > self.MOST * self._cell.size:
-                return None
-            self.choices += 1
-            zone = _Zone(depth, nodes, self._amg.restricted(nodes))
-        self._zones = [*self._zones[-self.KEPT + 1:], zone]
-        self.nodes = zone.nodes
-        return zone
+            return min(fit, key=lambda zone: zone.nodes.size)
+        depth = np.zeros_like(need)
+        _deepen(self._centres, np.flatnonzero(need), need, self.MARGIN * self._l, depth)
+        if np.count_nonzero(depth[self._cell]) > self.MOST * self._cell.size:
+            return None
+        self.choices += 1
+        return self.of_depth(depth)
 
-    # --- checkpoints ---
-    def memory(self) -> dict[str, np.ndarray]:
-        """What decides the zones of the next solves, for a checkpoint."""
-        return {"zone_depths": np.array([zone.depth for zone in self._zones]).reshape(-1, len(self._centres))}
-
-    def restore(self, memory: dict[str, np.ndarray]) -> None:
-        """Take up what :meth:`memory` gave."""
-        for depth in memory["zone_depths"]:
-            nodes = np.flatnonzero(depth[self._cell])
-            self._zones.append(_Zone(depth, nodes, self._amg.restricted(nodes)))
+    def of_depth(self, depth: np.ndarray) -> Zone:
+        """The zone with these depths of the cells [mm], as a checkpoint keeps them."""
+        nodes = np.flatnonzero(depth[self._cell])
+        return Zone(depth, nodes, self._amg.restricted(nodes))
 
 
 @njit(cache=True)

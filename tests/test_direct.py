@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from bodies import boundary, box, patchy, wavy
@@ -88,3 +90,29 @@ def test_released_factors_are_made_again():
     solver.release()
     solver.factorize(data)
     np.testing.assert_array_equal(solver.solve(b), x)
+
+
+def test_each_factorisation_has_its_own_number_of_threads(space: Space):
+    """Fails if the number of threads is that of the solver made last, which is one for the whole process in MKL."""
+    pypardiso = pytest.importorskip("pypardiso")
+    library = pypardiso.PyPardisoSolver(mtype=2).libmkl
+    momentum, pattern = body(space)
+    data = momentum.tangent(pattern, np.zeros_like(space.X))
+    solvers = {threads: Factorization(pattern, threads=threads) for threads in (2, 1)}
+    seen: dict[int, set[int]] = {1: set(), 2: set()}
+    for threads, solver in solvers.items():
+        solver.factorize(data)
+        handle = solver._handle(2)._handle
+        inner = handle._mkl_pardiso
+
+        def watched(*arguments: object, threads: int = threads, inner: Any = inner) -> None:
+            seen[threads].add(library.MKL_Get_Max_Threads())
+            inner(*arguments)
+
+        handle._mkl_pardiso = watched
+    before = library.MKL_Get_Max_Threads()
+    for threads in (1, 2, 1):
+        solvers[threads].factorize(data)
+        solvers[threads].apply(np.ones(pattern.size))
+    assert seen == {1: {1}, 2: {2}}
+    assert library.MKL_Get_Max_Threads() == before

@@ -24,7 +24,8 @@ IN_A_DECK = Parameter(parse=False)
 
 
 def custom(*, mesh: Annotated[str, SAMPLE] = "", title: Annotated[str, SAMPLE] = "Custom scene",
-           faces: Annotated[str, SAMPLE] = "", grips: Annotated[Sequence[Grip | Mapping[str, Any]], IN_A_DECK] = (),
+           faces: Annotated[str, SAMPLE] = "", merge_nodes: Annotated[float, SAMPLE] = 0.0,
+           grips: Annotated[Sequence[Grip | Mapping[str, Any]], IN_A_DECK] = (),
            tractions: Annotated[Sequence[Traction | Mapping[str, Any]], IN_A_DECK] = (),
            regions: Annotated[Sequence[RegionLaw | Mapping[str, Any]], IN_A_DECK] = (),
            options: Options = Options()) -> Result:  # noqa: B008
@@ -43,6 +44,8 @@ def custom(*, mesh: Annotated[str, SAMPLE] = "", title: Annotated[str, SAMPLE] =
     faces
         Of a sheet in three dimensions: names of the boundaries along which cracks run, with commas; they are no
         edges a crack arrives at.
+    merge_nodes
+        Distance within which nodes of the mesh become one [mm]; 0 leaves them apart. A mesh in pieces is refused.
     grips
         Boundaries that are held or moved: for x, y, z a velocity, or a ramp of points [time, displacement]; a
         component left out is free. The load is the force on the first one that moves.
@@ -63,7 +66,7 @@ def custom(*, mesh: Annotated[str, SAMPLE] = "", title: Annotated[str, SAMPLE] =
     given = {"grips": grips, "tractions": tractions, "regions": regions}
     tables = {name: read_tables(name, [item if isinstance(item, Mapping) else TABLES[name][1](item) for item in items])
               for name, items in given.items()}
-    own = {"mesh": str(mesh), "title": title, "faces": faces, **tables}
+    own = {"mesh": str(mesh), "title": title, "faces": faces, "merge_nodes": merge_nodes, **tables}
     return run_case(custom, _scene, own, options)
 
 
@@ -78,7 +81,7 @@ def _scene(own: dict[str, Any], options: Options) -> Scene:
     for name in ("half", "dimensions", "mesh_layout"):
         if getattr(options, name) != getattr(Options, name):
             raise ParameterError(f"{name} is for the cases of the paper; the mesh file {own['mesh']} is as it is")
-    sample = file_sample(Path(own["mesh"]))
+    sample = file_sample(Path(own["mesh"]), own.get("merge_nodes", 0.0))
     material, sink_law = options.stored_energy(), options.sink_law()
     laws = [region_from(table) for table in own["regions"]]
     regions = tuple(Region(law.name, sample.elements(law.name), *law.laws(material, sink_law)) for law in laws)

@@ -60,6 +60,12 @@ class SinkLaw:
         _history(W.ravel(), 1 / self.phi, m, float(np.exp(-40 / self.m)), H)
         return H.reshape(W.shape)
 
+    def coefficients(self, W: np.ndarray) -> np.ndarray:
+        """Coefficients 1/(H + eps) of the sink in Eq. (9) for the greatest stored energy W [MPa], of the same shape."""
+        H = self.history(W)
+        H += self.epsilon
+        return np.divide(1.0, H, out=H)
+
     @property
     def failure_energy(self) -> float:
         """Energy of a volume element taken to failure, psi_f = Phi Gamma(1/m, 0)/m [MPa] (Eq. 30)."""

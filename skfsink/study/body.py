@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..density import DensitySolver
+from ..density import Density, DensitySolver
 from ..energy import Ledger
 from ..errors import ConvergenceError, InstabilityError
 from ..explicit import Explicit, ExplicitControls
@@ -40,8 +40,8 @@ SLAB = (Grip("top", (0.0, SPEED, 0.0)), *(Grip(face, (None, None, 0.0)) for face
 class _Exact(DensitySolver):
     """Solves for gamma to the full tolerance every time."""
 
-    def solve(self, W_max: np.ndarray, gamma: np.ndarray, *_: Any, **__: Any) -> np.ndarray:
-        return super().solve(W_max, gamma)
+    def update(self, W_max: np.ndarray, before: Density, tolerance: float | None = None) -> Density:
+        return super().update(W_max, before)
 
 
 @dataclass(frozen=True, eq=False)

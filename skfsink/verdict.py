@@ -1,0 +1,58 @@
+"""What became of a run, in one line: cracked, arrested, still running, or not failed at all."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .density import DensitySolver
+from .scene import Scene
+from .simulate import Simulation
+from .state import State
+
+__all__ = ["greatest_ratio", "verdict"]
+
+
+def verdict(scene: Scene, simulation: Simulation) -> str:
+    """One line on what happened in a finished run."""
+    state, tracker, event = simulation.state, simulation.recorder.tracker, scene.controls.event_time
+    if simulation.unfailed:
+        ratio, place = greatest_ratio(simulation.density, state)
+        return (f"nothing failed: the greatest W/Phi was {ratio:.3g}, at {at(place)}, where points fail near 1; the "
+                f"loading ended because {simulation.unfailed}")
+    if simulation.dissolved:
+        return f"failed everywhere at once, {_when(scene, state.time)}: no place of it was weaker than another"
+    cracked = np.isfinite(tracker.cracked_at)
+    quasistatic = scene.controls.analysis == "quasistatic"
+    if not cracked.any():
+        if quasistatic:
+            return f"nothing cracked past the onset: {simulation.statics.arrested or 'the sweeps ended'}"
+        return (f"nothing cracked in the event_time of {event:g} s, least gamma {state.gamma.min():.3g}: the state past "
+                f"the onset has not run away yet")
+    if tracker.separated:
+        first = "" if tracker.arrival is None else f", arrived first {_when(scene, tracker.arrival)}"
+        return f"cracked and separated{first}; apart {_when(scene, simulation.recorder.separated_at)}"
+    tips = simulation.recorder.tips
+    if quasistatic and simulation.statics.arrested:
+        return f"arrested at {at(tips.position)}: {simulation.statics.arrested}"
+    if tips.active:
+        return f"the crack was still running at event_time = {event:g} s: its tip is at {at(tips.position)}"
+    arrived = "" if tracker.arrival is None else f" after it had arrived {_when(scene, tracker.arrival)}"
+    return f"arrested at {at(tips.position)}{arrived}: no tip has moved for 5 l/c_s at the end of the event"
+
+
+def greatest_ratio(density: DensitySolver, state: State) -> tuple[float, np.ndarray]:
+    """Greatest W/Phi that any Gauss point has seen, and the middle of its element [mm]."""
+    ratio = (state.W_max / density.phi).max(axis=1)
+    space = density.space
+    middle: np.ndarray = space.X[space.conn[int(np.argmax(ratio))]].mean(axis=0)
+    return float(ratio.max()), middle
+
+
+def at(place: np.ndarray) -> str:
+    """A place as it stands in a line."""
+    return "(" + ", ".join(f"{x:.3g}" for x in place) + ") mm"
+
+
+def _when(scene: Scene, clock: float) -> str:
+    """A time of the event, or a sweep."""
+    return f"in sweep {clock:.0f}" if scene.controls.analysis == "quasistatic" else f"at {clock * 1e6:.4g} µs"
