@@ -229,7 +229,8 @@ def test_nastran_without_begin_and_with_lines_that_go_on(tmp_path: Path) -> None
     (("CQUAD4,1,7,10,20,50,40", "CQUAD4,1,7,10,20,50,99"), "nodes that do not exist"),
     (("CQUAD4,1,7,10,20,50,40", "CQUAD4,1,7,10,20,x"), "line 11: the card CQUAD4 is not complete or has something"),
     (("CQUAD4,1,7,10,20,50,40", "CQUAD4,1,7,10"), "line 11: the card CQUAD4 is not complete"),
-    (("PSHELL,7,1,1.", "INCLUDE 'a.bdf'"), "line 16: it names another file")])
+    (("PSHELL,7,1,1.", "INCLUDE 'a.bdf'"), "line 16: it names another file"),
+    (("CQUAD4,1", "CQUADX4,1"), "line 11: it has elements CQUADX4 of a body of revolution")])
 def test_nastran_that_is_not_read(change: tuple[str, str], part: str, tmp_path: Path) -> None:
     """Fails if what cannot be right is read, or its line is not named."""
     assert change[0] in bulk("free")

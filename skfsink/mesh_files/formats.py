@@ -46,8 +46,10 @@ def read_format(path: Path) -> meshio.Mesh:
     name, reader = _reader(path)
     try:
         mesh = reader(path)
-    except (Unreadable, SkfsinkError, MemoryError):
+    except (Unreadable, SkfsinkError):
         raise
+    except MemoryError:
+        raise Unreadable("it needs more memory than a mesh file of its size should") from None
     except Exception as error:
         if name == ABAQUS:  # whose reader says what is wrong
             raise

@@ -87,7 +87,7 @@ def _masks(key: str, parts: Sequence[np.ndarray]) -> Iterator[tuple[str, np.ndar
         return
     for value in found.tolist():
         yield f"{key}:{int(value)}", values == value
-    if found.tolist() in ([0, 1], [1]):
+    if found.tolist() == [0, 1]:
         yield key, values == 1
 
 
