@@ -8,7 +8,26 @@ import numpy as np
 
 from .unreadable import Unreadable
 
-__all__ = ["Binary", "Text", "whole"]
+__all__ = ["Binary", "Text", "places", "whole"]
+
+
+def places(tags: np.ndarray, asked: np.ndarray) -> np.ndarray:
+    """Where the numbers `asked` are in `tags` (n,), each of which is there once.
+
+    Raises
+    ------
+    Unreadable
+        One of `tags` is there twice, or one that is asked for is not there.
+    """
+    order = np.argsort(tags, kind="stable")
+    known = tags[order]
+    if (twice := known[1:][known[1:] == known[:-1]]).size:
+        raise Unreadable(f"it has the node {twice[0]} twice")
+    place = np.searchsorted(known, asked)
+    if asked.size and (not len(known) or (known[np.minimum(place, len(known) - 1)] != asked).any()):
+        raise Unreadable("it has elements with nodes that do not exist")
+    found: np.ndarray = order[place]
+    return found
 
 
 def whole(values: np.ndarray) -> np.ndarray:
