@@ -8,6 +8,7 @@ from pathlib import Path
 import meshio
 
 from ..errors import SkfsinkError
+from .abaqus import read_abaqus
 from .exodus import read_exodus
 from .gmsh import read_gmsh
 from .nastran import read_nastran
@@ -55,8 +56,6 @@ def read_format(path: Path) -> meshio.Mesh:
     except (Unreadable, SkfsinkError, MemoryError):
         raise
     except Exception as error:
-        if name == "Abaqus":
-            raise
         raise Unreadable(f"it is damaged, or not of the format {name}") from error
     mesh.info = {"notes": [], **(mesh.info or {})}
     return mesh
@@ -85,7 +84,7 @@ def _inp(path: Path) -> meshio.Mesh:
     with path.open("rb") as file:
         if is_ucd(file.read(10**5)):
             return _ucd(path)
-    return meshio.read(path, "abaqus")
+    return read_abaqus(path)
 
 
 def _ucd(path: Path) -> meshio.Mesh:
