@@ -213,10 +213,12 @@ def warn(scene: Scene, folder: Path) -> None:
     for part in scene.parts:
         _warn_of_material(scene, part)
     loading = scene.loading()
-    for motion in free_motions(space, loading.free):
-        if not motion.unheld:
-            log.warning("the grips leave %s free to %s: it may drift or turn as it is loaded, which displacements and "
-                        "pictures show; %s", motion.piece, motion.name, motion.cure)
+    motions = [motion for motion in free_motions(space, loading.free) if not motion.unheld]
+    if motions:
+        log.warning("the grips leave %s%s: it may drift or turn as it is loaded, which displacements and pictures "
+                    "show; %s", ", and ".join(f"{m.piece} free to {m.name}" for m in motions[:3]),
+                    f", and {len(motions) - 3} more motions" if len(motions) > 3 else "",
+                    "; ".join(dict.fromkeys(m.cure for m in motions)))
     if _dynamic(scene):
         _warn_of_events(scene, loading, folder)
 
