@@ -133,15 +133,16 @@ def refuse(scene: Scene) -> None:
     loading = scene.loading()
     if _dynamic(scene):
         _refuse_events(scene, loading)
-    count = int(pieces(space).max()) + 1
+    label = pieces(space)
+    count = int(label.max()) + 1
     if count > PIECES:
         raise ParameterError(f"the mesh is in {count} pieces that share no side (at most {PIECES}): merge nodes that "
                              f"coincide")
-    for motion in free_motions(space, loading.free):
+    for motion in free_motions(space, loading.free, label):
         if motion.unheld:
             raise ParameterError(f"nothing holds {motion.piece}: its nodes are in no grip, nor joined to a piece that "
                                  f"is held; merge nodes that coincide, or hold it at a boundary")
-    if not scene.tractions and moves_as_a_whole(space, loading):
+    if not scene.tractions and moves_as_a_whole(space, loading, label):
         whole = "the body" if count == 1 else f"each of the {count} pieces of the body, which are not joined,"
         raise ParameterError(f"the grips move {whole} as a whole and strain nothing: hold another boundary in the "
                              f"direction of the one that moves{', or merge nodes that coincide' if count > 1 else ''}")
