@@ -32,8 +32,8 @@ from .units import UNITS, number_in
 __all__ = ["CASES", "Deck", "case_function", "parameters_of", "read_deck", "read_value", "stored_case"]
 
 CASES = tuple(sorted(module.name for module in pkgutil.iter_modules(cases.__path__)))
-TOP = ("case", "parameters", "assumed", "choice")  # the last two are what a run says of itself; a deck may have them
-NOT_IN_A_DECK = ("out", "resume", "overwrite", "quiet", "corridor", "given")
+TOP = ("case", "parameters", "source", "assumed", "choice")  # the last three a run says of itself; a deck may have them
+NOT_IN_A_DECK = ("out", "resume", "overwrite", "quiet", "corridor", "kept", "given")
 LARGEST = 1_000_000  # bytes
 
 

@@ -127,7 +127,8 @@ class Run:
     ----------
     folder: of the run.
     summary: content of `summary.json`; empty if the run is not finished.
-    case, parameters, assumed, choice: content of `scene.toml`.
+    case, parameters, assumed, choice: content of `scene.toml`; the mesh is the file that was given to the run, not the
+        copy that this keeps.
     parts: of `analysis="both"` the two runs, "dynamic" and "quasistatic", as far as they were begun; otherwise empty.
     """
 
@@ -241,6 +242,8 @@ def load(folder: str | Path) -> Run:
             data = tomllib.loads(path.read_text(encoding="utf-8"))
         case = str(data["case"])
         parameters = joined(data, case == "custom")
+        if "source" in data:
+            parameters["mesh"] = str(data["source"])
         assumed, choice = tuple(map(str, data.get("assumed", ()))), dict(data.get("choice", {}))
     except (UnicodeDecodeError, tomllib.TOMLDecodeError, KeyError, TypeError, ValueError) as error:
         raise OutputError(f"{path} is not the scene of a run: {error}") from None

@@ -19,6 +19,7 @@ import numpy as np
 import psutil
 
 from .errors import MeshError, SkfsinkError
+from .kept_mesh import SUFFIX, read_kept
 from .meshing import read_mesh
 
 __all__ = ["check_mesh", "one_line", "quietly", "read_mesh_file"]
@@ -77,7 +78,7 @@ def read_mesh_file(path: Path) -> meshio.Mesh:
     if suffix in POINTERS or (suffix == ".inp" and _includes(path)):
         raise MeshError(f"{failure}: it names other files; put the mesh into one file, such as VTU")
     with _room(max(ROOM[0], ROOM[1] * status.st_size)):
-        mesh = quietly(lambda: read_mesh(path), failure)
+        mesh = quietly(lambda: read_kept(path) if suffix == SUFFIX else read_mesh(path), failure)
         quietly(lambda: _sound(mesh), failure)
     check_mesh(shown, mesh)
     return mesh

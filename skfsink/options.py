@@ -19,7 +19,7 @@ from .statics import StaticsControls
 __all__ = ["LAYOUTS", "QUANTITIES", "SAMPLE", "Options"]
 
 # say where a run goes, or how its model was chosen, not what it is
-NOT_PHYSICS = ("model", "tolerance", "quantity", "corridor", "out", "resume", "overwrite", "quiet", "given")
+NOT_PHYSICS = ("model", "tolerance", "quantity", "corridor", "out", "resume", "overwrite", "quiet", "kept", "given")
 LAYOUTS = ("corridor", "uniform", "two-pass")
 QUANTITIES = ("onset_load", "onset_displacement", "U", "D", "arrival_time", "tip_speed", "crack_path")
 
@@ -147,6 +147,8 @@ class Options:
         Show no progress.
     corridor
         Mesh that the first of two passes has left; set by the run.
+    kept
+        Mesh of the body that the run has left in its folder; set by the run.
     given
         Names of the options that a command line gave; a resumed run checks that they are its own.
     """
@@ -196,6 +198,7 @@ class Options:
     overwrite: Annotated[bool, OUTPUT, FLAG] = False
     quiet: Annotated[bool, OUTPUT, FLAG] = False
     corridor: Annotated[Path | None, Parameter(parse=False)] = None
+    kept: Annotated[Path | None, Parameter(parse=False)] = None
     given: Annotated[frozenset[str], Parameter(parse=False)] = frozenset()
 
     def __post_init__(self) -> None:

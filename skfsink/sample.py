@@ -19,7 +19,8 @@ from .meshing import read_mesh
 from .shapes import SHAPES
 from .space import Space
 
-__all__ = ["Sample", "data_folder", "data_roots", "file_sample", "load_sample", "shape_mesh", "shape_sample"]
+__all__ = ["Sample", "data_folder", "data_roots", "file_sample", "kept_sample", "load_sample", "shape_mesh",
+           "shape_sample"]
 
 SIDE = 1e-6  # distance from the end of a body, over its size, within which a node is on that side
 _CELLS = {"quad": (skfem.MeshQuad, "line"), "hexahedron": (skfem.MeshHex, "quad")}
@@ -36,6 +37,7 @@ class Sample:
     boundaries: nodes of each named boundary, ascending.
     cells: numbers of the elements of each named set, ascending.
     made: whether the mesh was made by gmsh, and is not a file of the user's or a committed one.
+    source: path of the file of the user's that it was read from first; "" for other meshes.
     """
 
     name: str
@@ -43,6 +45,7 @@ class Sample:
     boundaries: Mapping[str, np.ndarray]
     made: bool = False
     cells: Mapping[str, np.ndarray] = field(default_factory=dict)
+    source: str = ""
 
     def nodes(self, boundary: str) -> np.ndarray:
         """Nodes of a named boundary.
@@ -116,7 +119,18 @@ def load_sample(case: str, mesh: str, make: Callable[[], meshio.Mesh] | None = N
         return _from_meshio(mesh, lift(quietly(lambda: read_mesh(path), f"the mesh file {path} cannot be read")))
     if not Path(mesh).suffix:
         raise MeshError(f"mesh must be one of {', '.join(known)}, or the path of a mesh file; got {mesh!r}")
-    return _from_meshio(mesh, read_mesh_file(Path(mesh)))
+    return _from_meshio(mesh, read_mesh_file(Path(mesh)), source=mesh)
+
+
+def kept_sample(path: Path) -> Sample:
+    """The sample that a run has left in its folder.
+
+    Raises
+    ------
+    MeshError
+        As of :func:`load_sample`.
+    """
+    return _from_meshio(str(path), read_mesh_file(path))
 
 
 def file_sample(path: Path) -> Sample:
@@ -130,7 +144,7 @@ def file_sample(path: Path) -> Sample:
     MeshError
         As of :func:`load_sample`.
     """
-    sample = _from_meshio(str(path), read_mesh_file(path))
+    sample = _from_meshio(str(path), read_mesh_file(path), source=str(path))
     X = sample.space.X
     near = SIDE * float(np.ptp(X, axis=0).max())
     sides = {}
@@ -187,8 +201,8 @@ def _as_it_is(mesh: meshio.Mesh) -> meshio.Mesh:
     return mesh
 
 
-def _from_meshio(name: str, data: meshio.Mesh, made: bool = False) -> Sample:
-    shown = one_line(name)
+def _from_meshio(name: str, data: meshio.Mesh, made: bool = False, source: str = "") -> Sample:
+    shown, info = one_line(name), data.info or {}
     present = [kind for kind in _CELLS if kind in data.cells_dict]
     others = sorted({b.type for b in data.cells} - {"quad", "hexahedron", "line", "vertex"})
     if others or not any(len(data.cells_dict[kind]) for kind in present):
@@ -206,7 +220,8 @@ def _from_meshio(name: str, data: meshio.Mesh, made: bool = False) -> Sample:
         space = Space(mesh_class(np.ascontiguousarray(points.T), np.ascontiguousarray(connectivity.astype(np.int64))))
     except MeshError as error:
         raise MeshError(f"mesh {shown}: {error}") from None
-    return Sample(Path(name).stem, space, _boundaries(data, facet), made, _elements(data, kind))
+    return Sample(info.get("name") or Path(name).stem, space, _boundaries(data, facet), info.get("made", made),
+                  _elements(data, kind), info.get("source", source))
 
 
 def _elements(data: meshio.Mesh, kind: str) -> dict[str, np.ndarray]:

@@ -231,13 +231,17 @@ class Scene:
                 row[:] = [v.rate(0.0) if isinstance(v, Ramp) else v or 0.0 for v in grip.velocity]
         return float(np.linalg.norm(velocity[0] - velocity[1]))
 
-    def toml(self) -> str:
-        """Text of `scene.toml`."""
+    def toml(self, mesh: str = "") -> str:
+        """Text of `scene.toml`; `mesh` is the name of a file beside it that keeps the mesh of a file of the user's."""
         head = ("# A run of skfsink. Run it again with: skfsink run scene.toml\n"
                 "# Plain numbers are in N, mm, MPa and s; density in kg/m^3.\n")
         parameters = {k: v.item() if isinstance(v, np.generic) else v for k, v in self.parameters.items()}
+        source = {}
+        if mesh and self.sample.source:
+            parameters["mesh"], source = mesh, {"source": self.sample.source}
         choice = {"choice": dict(self.choice)} if self.choice else {}
-        return head + tomli_w.dumps({"case": self.case, **split(parameters), "assumed": list(self.assumed), **choice})
+        return head + tomli_w.dumps({"case": self.case, **source, **split(parameters), "assumed": list(self.assumed),
+                                     **choice})
 
     @property
     def fingerprint(self) -> str:
@@ -259,7 +263,7 @@ class Scene:
 
 
 def read_parameters(folder: Path, case: str) -> dict[str, Any]:
-    """Parameters in the `scene.toml` of a run.
+    """Parameters in the `scene.toml` of a run; a mesh file that it keeps is given by its path.
 
     Raises
     ------
@@ -276,6 +280,8 @@ def read_parameters(folder: Path, case: str) -> dict[str, Any]:
         raise OutputError(f"{path} is not the scene of a run: {error}") from None
     if found != case:
         raise OutputError(f"{folder} holds a run of case {found}, not of {case}")
+    if Path(mesh := str(parameters.get("mesh", ""))).suffix:
+        parameters["mesh"] = str((folder / mesh).absolute())
     return parameters
 
 
