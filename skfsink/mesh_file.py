@@ -69,7 +69,8 @@ def read_mesh_file(path: Path) -> meshio.Mesh:
     try:
         status = os.stat(path)
     except (OSError, ValueError):
-        raise MeshError(f"there is no mesh file {shown}") from None
+        cure = r": folders are parted by / here, not by \ as on Windows" if "\\" in str(path) and os.sep == "/" else ""
+        raise MeshError(f"there is no mesh file {shown}{cure}") from None
     if not stat.S_ISREG(status.st_mode):
         raise MeshError(f"there is no mesh file {shown}: what has that name is no file with content")
     if status.st_size > LARGEST:

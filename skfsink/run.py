@@ -6,7 +6,6 @@ import importlib
 import inspect
 import logging
 import shlex
-import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import fields, replace
@@ -29,6 +28,7 @@ from .result import Result, summarize
 from .scene import Scene, read_choice, read_parameters
 from .simulate import Interrupted, Simulation, onset_copy
 from .state import State
+from .text import read_toml
 
 __all__ = ["read_scene", "run_case"]
 
@@ -101,14 +101,13 @@ def read_scene(folder: Path) -> Scene:
     if not path.is_file():
         raise OutputError(f"{folder} holds no run: there is no {path}")
     try:
-        case = str(tomllib.loads(path.read_text(encoding="utf-8"))["case"])
+        case = str(read_toml(path)["case"])
         module = importlib.import_module(f"skfsink.cases.{case}")
         stored = read_parameters(folder, case)
         own = {name: stored.pop(name) for name in inspect.signature(getattr(module, case)).parameters
                if name != "options"}
         options = replace(Options(), **stored, corridor=_corridor(folder), kept=_kept(folder, own))
-    except (ModuleNotFoundError, UnicodeDecodeError, tomllib.TOMLDecodeError, AttributeError, KeyError,
-            TypeError) as error:
+    except (ModuleNotFoundError, ValueError, AttributeError, KeyError, TypeError) as error:
         raise OutputError(f"{path} is not the scene of a run: {error}") from None
     scene: Scene = module._scene(own, options)
     return scene

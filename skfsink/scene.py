@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import os
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -28,6 +27,7 @@ from .regions import Region, check_lengths, divided
 from .sample import Sample
 from .statics import StaticsControls
 from .tables import joined, split
+from .text import read_toml
 
 __all__ = ["ANALYSES", "INTEGRATORS", "STARTS", "Controls", "Grip", "Scene", "choose", "read_choice",
            "read_parameters"]
@@ -274,9 +274,9 @@ def read_parameters(folder: Path, case: str) -> dict[str, Any]:
     if not path.is_file():
         raise OutputError(f"{folder} holds no run to resume: there is no {path}")
     try:
-        data = tomllib.loads(path.read_text())
+        data = read_toml(path)
         found, parameters = str(data["case"]), joined(data, case == "custom")
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, KeyError, TypeError, ValueError) as error:
+    except (OSError, KeyError, TypeError, ValueError) as error:
         raise OutputError(f"{path} is not the scene of a run: {error}") from None
     if found != case:
         raise OutputError(f"{folder} holds a run of case {found}, not of {case}")
@@ -287,4 +287,4 @@ def read_parameters(folder: Path, case: str) -> dict[str, Any]:
 
 def read_choice(folder: Path) -> dict[str, Any]:
     """The choice of a model in the `scene.toml` of a run; empty if there is none."""
-    return dict(tomllib.loads((folder / "scene.toml").read_text()).get("choice", {}))
+    return dict(read_toml(folder / "scene.toml").get("choice", {}))
