@@ -70,12 +70,13 @@ def run_case(case: Callable[..., Result], make_scene: SceneMaker, own: dict[str,
                 display.say(choice["text"])
             scene = replace(make_scene(own, options), choice=choice)
             check_memory(scene, display)
+            if not resume:
+                refuse(scene)  # before anything is written
             with ExitStack() as locks:
                 places = [folder, *(folder / part for part in PARTS if options.analysis == "both")]
                 there = [place for place in places if place == folder or place.exists()]
                 notes += [locks.enter_context(occupied(place)) for place in there]
                 if not resume:
-                    refuse(scene)
                     _begin(folder, options.overwrite)
                     if options.mesh_layout == "two-pass":
                         options = lay_corridor(scene, own, options, folder, display)
