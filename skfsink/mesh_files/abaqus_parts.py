@@ -304,8 +304,8 @@ class Part:
         if "COMBINE" in block.parameters:
             how = block.parameters["COMBINE"].upper()
             if how != "UNION":
-                raise block.error(f"the surface {surface.name[:60]!r} is made by COMBINE={how[:20]}, which is not read: "
-                                  "write its faces")
+                raise block.error(f"the surface {surface.name[:60]!r} is made by COMBINE={how[:20]}, which is not "
+                                  "read: write its faces")
             surface.kind = "UNION"
         if "CROP" in block.parameters:
             raise block.error(f"the surface {surface.name[:60]!r} is made by CROP=, which is not read: write its faces")
