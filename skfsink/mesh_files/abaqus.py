@@ -40,9 +40,9 @@ def read_abaqus(path: Path) -> meshio.Mesh:
     Unreadable
         What is wrong, with the line.
     """
-    model = Model(read_blocks(path))
     if not is_keyword_file(path):
         raise Unreadable("it is no keyword file of Abaqus, whose first line begins with *, and no UCD file")
+    model = Model(read_blocks(path))
     return Cells(model.body, model.notes).mesh(model.names)
 
 
