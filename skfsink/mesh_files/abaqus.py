@@ -40,10 +40,10 @@ def read_abaqus(path: Path) -> meshio.Mesh:
     Unreadable
         What is wrong, with the line.
     """
-    model = Model(read_blocks(path))
     if not is_keyword_file(path):
         raise Unreadable("it is no keyword file of Abaqus, whose first line begins with *, and no UCD file")
-    return Cells(model.body, model.notes, model.written_by_meshio).mesh(model.names)
+    model = Model(read_blocks(path))
+    return Cells(model.body, model.notes).mesh(model.names)
 
 
 class Model:
@@ -60,7 +60,8 @@ class Model:
         self.notes: list[str] = []
         self.body = Body()
         self.users = _users(blocks)
-        self.written_by_meshio = any("written by meshio" in line for block in blocks[:1] for line in block.data[:3])
+        if any("written by meshio" in line for block in blocks[:1] for line in block.data[:3]):
+            self._by_meshio(blocks)
         self.root = Part("", self.users)
         self.parts: dict[str, Part] = {}
         self.instances: dict[str, tuple[str, Part, Part, Block]] = {}
@@ -68,6 +69,15 @@ class Model:
         self._sort(blocks)
         self._place()
         self.names = {kind: self._names(kind) for kind in ("node_sets", "element_sets", "surfaces")}
+
+    def _by_meshio(self, blocks: list[Block]) -> None:
+        """Files of meshio (5.3) have the type CAX4P, the last of its table, for all quadrilaterals."""
+        wrong = [block for block in blocks if block.keyword == "ELEMENT" and block.parameters.get("TYPE") == "CAX4P"]
+        for block in wrong:
+            block.parameters["TYPE"] = "CPE4"
+        if wrong:
+            self.notes.append("meshio wrote the file, and writes all quadrilaterals as axisymmetric (CAX4P): they are "
+                              "taken as plane")
 
     def _sort(self, blocks: list[Block]) -> None:
         """Read each block into the part that it stands in."""

@@ -30,7 +30,7 @@ class Cells:
     block, row: of each element, among the cells; block -1 where it has no cell.
     """
 
-    def __init__(self, body: Body, notes: list[str], written_by_meshio: bool = False) -> None:
+    def __init__(self, body: Body, notes: list[str]) -> None:
         self.body, self.notes = body, notes
         self.block, self.row = np.full(body.n_elements, -1), np.zeros(body.n_elements, np.int64)
         self.cells: list[tuple[str, np.ndarray]] = []
@@ -48,11 +48,10 @@ class Cells:
         users = [k for k, (own, _, nodes) in enumerate(body.blocks) if own.user is not None and len(nodes)]
         if not users:
             return
-        sizes = {body.blocks[k][2].shape[1] for k in users}
-        for size in sizes:
-            known[size] = _joined([(np.sort(nodes, axis=1), at + np.arange(len(nodes))) for own, at, nodes in body.blocks
-                                   if own.user is None and own.cell not in ("", "line") and nodes.shape[1] == size],
-                                  size)
+        others = [(at, nodes) for own, at, nodes in body.blocks if own.user is None and own.cell not in ("", "line")]
+        for size in {body.blocks[k][2].shape[1] for k in users}:
+            known[size] = _joined([(np.sort(nodes, axis=1), at + np.arange(len(nodes))) for at, nodes in others
+                                   if nodes.shape[1] == size], size)
         twins: dict[tuple[str, str], list[int]] = {}
         for k in users:
             own, at, nodes = body.blocks[k]
@@ -165,9 +164,6 @@ class Cells:
         if shells := [kind for kind in kinds if SHELL.match(kind)]:
             self.notes.append(f"shells and membranes ({listed(shells)}) are taken as plane elements, whose thickness "
                               "and plane stress or strain a deck decides")
-        if "CAX4P" in kinds:
-            self.notes.append("the elements are of type CAX4P, as which meshio writes all quadrilaterals: they are "
-                              "taken as plane")
 
     def mesh(self, names: dict[str, Names]) -> meshio.Mesh:
         """The mesh with the sets and surfaces of the model."""

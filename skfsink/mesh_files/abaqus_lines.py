@@ -106,7 +106,7 @@ class Numbers:
                 self.table = numbers.reshape(len(lines), counts.pop() + 1)
 
     def many(self, entries: list[str]) -> np.ndarray | None:
-        """Entries as numbers, or None if one is none."""
+        """Entries as numbers, or None if one is none (`1_0` is one in Python only)."""
         with contextlib.suppress(ValueError, OverflowError):
             return self._converted(entries)
         if self.whole:
@@ -131,7 +131,7 @@ class Numbers:
         """
         for i in self.at:
             entries = words(self.block.data[i].strip())
-            found = self.many(entries)
+            found = self.many(entries) if "_" not in self.block.data[i] else None
             yield i, found.tolist() if found is not None else [number(self.block, i, word, self.whole)
                                                               for word in entries]
 
@@ -287,12 +287,13 @@ def _found(name: str, folder: Path, above: tuple[Path, ...], where: str) -> Path
     for base in dict.fromkeys((folder, above[-1].parent)):
         try:
             path = (base / name.replace("\\", "/")).resolve()
-            if not path.is_relative_to(folder):
-                raise Unreadable(f"{failure} is not in the folder of the mesh file; copy it there")
-            if not path.is_file():
-                continue
+            there = not path.is_relative_to(folder) or path.is_file()
         except (OSError, ValueError, RuntimeError):
             continue
+        if not there:
+            continue
+        if not path.is_relative_to(folder):
+            raise Unreadable(f"{failure} is not in the folder of the mesh file; copy it there")
         if path in above:
             raise Unreadable(f"{failure} includes itself")
         return path

@@ -195,6 +195,8 @@ class Part:
         numbers, nodes = read[:, 0], read[:, 1:]
         if len(numbers) and numbers.min() < 1:
             raise block.error(f"{numbers.min()} is no number of an element")
+        if cell == "wedge15":  # which meshio cannot hold
+            cell, nodes = "wedge", nodes[:, :6]
         if cell in ORDER:
             nodes = nodes[:, ORDER[cell]]
         self.add_elements(Elements(shown, cell, numbers, nodes, block, user))
@@ -287,7 +289,8 @@ class Part:
             return
         read = Numbers(block, whole=True)
         texts = [block.data[i].strip() for i in read.at]
-        many = read.many(",".join(t[:-1] if t.endswith(",") else t for t in texts).split(",")) if texts else None
+        joined = ",".join(t[:-1] if t.endswith(",") else t for t in texts)
+        many = read.many(joined.split(",")) if texts and "_" not in joined else None
         if many is not None:
             entries.append(Entry(many, block, None, instance))
             return
@@ -304,8 +307,8 @@ class Part:
         if "COMBINE" in block.parameters:
             how = block.parameters["COMBINE"].upper()
             if how != "UNION":
-                raise block.error(f"the surface {surface.name[:60]!r} is made by COMBINE={how[:20]}, which is not read: "
-                                  "write its faces")
+                raise block.error(f"the surface {surface.name[:60]!r} is made by COMBINE={how[:20]}, which is not "
+                                  "read: write its faces")
             surface.kind = "UNION"
         if "CROP" in block.parameters:
             raise block.error(f"the surface {surface.name[:60]!r} is made by CROP=, which is not read: write its faces")
