@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import random
 from pathlib import Path
 
@@ -394,3 +395,36 @@ def test_broken_exodus(tmp_path: Path) -> None:
     for seed in range(100):
         (tmp_path / "a.e").write_bytes(mutated(content, random.Random(seed)))
         outcome(tmp_path / "a.e")
+
+
+def test_heads_that_are_encoded_alone(tmp_path: Path) -> None:
+    """Fails if the number of bytes of an array cannot stand in base64 of its own, as some programs write it."""
+    def array(values: list[float], kind: str, attributes: str) -> str:
+        data = np.array(values, kind).tobytes()
+        text = (base64.b64encode(len(data).to_bytes(4, "little")) + base64.b64encode(data)).decode()
+        return f'<DataArray {attributes} format="binary">\n  {text}\n</DataArray>'
+
+    points = array([float(x) for x in SQUARE.split()], "<f8", 'type="Float64" NumberOfComponents="3"')
+    cells = "".join(array(values, kind, f'type="{name}" Name="{what}"') for values, kind, name, what in (
+        ([0, 1, 2, 3], "<i4", "Int32", "connectivity"), ([4], "<i4", "Int32", "offsets"),
+        ([9], "u1", "UInt8", "types")))
+    (tmp_path / "a.vtu").write_text(xml(f'<Piece NumberOfPoints="4" NumberOfCells="1"><Points>{points}</Points>'
+                                        f"<Cells>{cells}</Cells></Piece>", 'byte_order="LittleEndian"'))
+    assert file_sample(tmp_path / "a.vtu").space.V.tolist() == [pytest.approx(1)]
+
+
+def test_texts_and_bits_in_legacy_files(tmp_path: Path) -> None:
+    """Fails if a text among the data hides what follows, or bits are misread, in text or in bytes."""
+    head = "# vtk DataFile Version 3.0\nt\n{}\nDATASET UNSTRUCTURED_GRID\n"
+    text = (f"{head.format('ASCII')}POINTS 4 float\n{SQUARE}\nCELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n9\n"
+            "POINT_DATA 4\nMETADATA\nINFORMATION 0\n\nFIELD FieldData 2\nnote 1 2 string\nfree text\nPOINTS\n"
+            "clamp 1 4 bit\n1 0 0 1\nNORMALS n float\n" + "0 0 1\n" * 4)
+    points = np.array([float(x) for x in SQUARE.split()], ">f4").tobytes()
+    binary = (head.format("BINARY") + "POINTS 4 float\n").encode() + points + b"\nCELLS 1 5\n" + np.array(
+        [4, 0, 1, 2, 3], ">i4").tobytes() + b"\nCELL_TYPES 1\n" + np.array([9], ">i4").tobytes() + (
+        b"\nPOINT_DATA 4\nFIELD FieldData 2\nnote 1 2 string\n" + bytes([0xc0 + 4]) + b"text" + bytes([0x80, 70])
+        + b"x" * 70 + b"\nclamp 1 4 bit\n\x90\n")
+    for content in (text.encode(), binary, text.replace("\n", "\r\n").encode()):
+        (tmp_path / "a.vtk").write_bytes(content)
+        sample = file_sample(tmp_path / "a.vtk")
+        assert named(sample)["clamp"] == {(0, 0), (0, 1)} and len(sample.space.conn) == 1

@@ -12,7 +12,8 @@ from pathlib import Path
 import meshio
 import numpy as np
 
-from .msh import DIMENSION, NODES, SHAPE, Block, Msh, read_msh
+from .msh import Msh, read_msh
+from .msh_block import DIMENSION, NODES, SHAPE, Block
 from .numbers import places
 from .sets import join_boundaries
 from .unreadable import Unreadable
