@@ -31,6 +31,8 @@ class Notes(logging.Handler):
     As a context manager it listens to all modules of the package. Two warnings are the same if they were made from the
     same text, whatever the numbers in it.
 
+    Memory: the warnings `kept`; `emit` leaves out one that came up before, `texts` has all so far.
+
     Parameters
     ----------
     show: what to do with a new one.
@@ -69,6 +71,9 @@ class Notes(logging.Handler):
 
 class Guard:
     """Watches one run of a scene.
+
+    Memory: evenness and energy at the onset, and failed elements at the last step; `check_step`, `check_record` and
+    `even` judge by them.
 
     Parameters
     ----------

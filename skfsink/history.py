@@ -91,6 +91,8 @@ class Table(dict[str, np.ndarray]):
 class History:
     """The table of a run, a row at each recorded time, in memory and in a file that grows with it.
 
+    Memory: the `rows`; `append` adds to them, `columns` has all so far.
+
     Parameters
     ----------
     path: of the CSV file, written anew here.

@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import csv
 import io
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -24,6 +23,7 @@ from .files import reported
 from .history import History, Table
 from .output import SUMMARY, frame_times, read_summary
 from .tables import joined
+from .text import read_toml
 
 if TYPE_CHECKING:
     from .scene import Scene
@@ -128,7 +128,8 @@ class Run:
     ----------
     folder: of the run.
     summary: content of `summary.json`; empty if the run is not finished.
-    case, parameters, assumed, choice: content of `scene.toml`.
+    case, parameters, assumed, choice: content of `scene.toml`; the mesh is the file that was given to the run, not the
+        copy that this keeps.
     parts: of `analysis="both"` the two runs, "dynamic" and "quasistatic", as far as they were begun; otherwise empty.
     """
 
@@ -244,11 +245,13 @@ def load(folder: str | Path) -> Run:
         raise OutputError(f"{folder} holds no run: there is no {path}")
     try:
         with reported(f"cannot read {path}"):
-            data = tomllib.loads(path.read_text(encoding="utf-8"))
+            data = read_toml(path)
         case = str(data["case"])
         parameters = joined(data, case == "custom")
+        if "source" in data:
+            parameters["mesh"] = str(data["source"])
         assumed, choice = tuple(map(str, data.get("assumed", ()))), dict(data.get("choice", {}))
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError, KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError) as error:
         raise OutputError(f"{path} is not the scene of a run: {error}") from None
     summary = read_summary(folder) if (folder / SUMMARY).exists() else {}
     parts = {name: load(folder / name) for name in ("dynamic", "quasistatic")

@@ -28,6 +28,9 @@ class Recorder:
 
     `memory` is what :meth:`memory` gave for a checkpoint, to go on from there.
 
+    Memory: rows, frames, moments and the crack so far. `loading`, `loading_frame`, `unfailed`, `reached_onset`,
+    `start`, `watch`, `frame` and `finish` add to them, in the order of the run; `memory` gives what a checkpoint needs.
+
     Attributes
     ----------
     tracker: the crack.   tips: the crack at the last record.   guard: watches the run.

@@ -38,6 +38,9 @@ class Interrupted(SkfsinkError):
 class Simulation:
     """One run of a scene in a folder, resumable at any moment.
 
+    Memory: the whole run: `run` goes on from where it is; `unfailed`, `dissolved`, `cost` and `checkpoint` are of the
+    run so far.
+
     Parameters
     ----------
     scene: what to run; its analysis is "dynamic" or "quasistatic".

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from bodies import grid
 
-from skfsink.crack import CrackTracker
+from skfsink.crack import CrackTracker, Plane
 from skfsink.space import Space
 
 L, CS = 0.1, 30.0  # length scale [mm], shear wave speed [m/s]
@@ -97,3 +97,30 @@ def test_leading_tip_is_kept_where_it_forks() -> None:
         tips = track.look(time, gamma)
     np.testing.assert_allclose(tips.position, (1.3, 0.65))
     assert tips.branches == 2  # the old arm and the new tip; the shorter arm of the fork may yet be roughness
+
+
+def test_a_plane_of_symmetry_is_no_edge_but_a_mirror() -> None:
+    """Fails if a crack along a plane of symmetry does not arrive, or one across it waits for an edge of the image.
+
+    The plane is y = 0: a crack along it arrives at x = 2. The plane is x = 0: a crack from it to x = 2 joins that edge
+    to its image, one from x = 0 to half of the width does not, and neither does one from x = 2 that stops before it.
+    """
+    _, space = tracker()
+    X = space.X
+    left, right, low, high = (X[:, 0] < 1e-9, X[:, 0] > 2 - 1e-9, X[:, 1] < 1e-9, X[:, 1] > 1 - 1e-9)
+
+    def cut_along(axis: int, plane: np.ndarray, others: np.ndarray) -> CrackTracker:
+        return CrackTracker(space, L, CS, [np.flatnonzero(low), np.flatnonzero(high)], np.flatnonzero(others),
+                            [Plane(axis, np.flatnonzero(plane))])
+
+    along = cut_along(1, low & (X[:, 0] > 0.5), left | right | high | (low & (X[:, 0] < 0.51)))
+    assert not along.mark(1e-6, line(space, 0.5, 1.95, 0.0))
+    assert along.mark(2e-6, line(space, 0.5, 2.0, 0.0))
+    across = cut_along(0, left, right | low | high)
+    assert not across.mark(1e-6, line(space, 0.0, 1.0))
+    assert across.mark(2e-6, line(space, 0.0, 2.0))
+    inwards = cut_along(0, left, right | low | high)
+    assert not inwards.mark(1e-6, line(space, 0.05, 2.0))
+    assert inwards.mark(2e-6, line(space, 0.0, 2.0))
+    corner = cut_along(0, left, right | low | high)  # a place that is on the plane is its own image
+    assert not corner.mark(1e-6, line(space, 0.0, 2.0, 0.0))

@@ -6,6 +6,7 @@ import contextlib
 import csv
 import json
 import os
+import shutil
 import subprocess
 import sys
 import time
@@ -18,6 +19,8 @@ import pytest
 from PIL import Image
 from plates import invoke_program, plate
 
+import skfsink.run
+import skfsink.sweep.plan
 from skfsink.deck import parameters_of, read_deck
 from skfsink.errors import OutputError, ParameterError
 from skfsink.meshing import write_mesh
@@ -222,6 +225,39 @@ def test_a_worker_that_is_killed_loses_nothing_and_repeats_nothing(
     assert all(row["onset_load [N/mm]"] and not row["failure"] for row in rows)
     assert starts(out).count("begun") == 4
     assert starts(out).count("resumed") == 1
+
+
+def test_a_sweep_goes_on_elsewhere(deck: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fails if a sweep that was moved is taken for another one, needs the mesh of begun runs, or takes another mesh."""
+    monkeypatch.setattr(skfsink.run, "draw_run", lambda *_: None)
+    here, far = tmp_path / "here", tmp_path / "far"
+    here.mkdir(), far.mkdir()
+    for name in ("plate.vtu", "scene.toml"):
+        shutil.move(tmp_path / name, here / name)
+    monkeypatch.setattr(skfsink.sweep.plan, "here", lambda folders, jobs: (folder for folder in ()))
+    run_sweep(here / "scene.toml", ["phi=0.15,0.16"], here / "sweep", quiet=True)
+    run_folder(here / "sweep" / "phi=0.15")
+    first = (here / "sweep" / "phi=0.15" / "run" / "history.csv").read_bytes()
+    (here / "sweep" / "phi=0.15" / "run" / "summary.json").unlink()  # it has its last pictures to draw
+    shutil.copytree(here / "sweep", far / "sweep")
+    for name in ("plate.vtu", "scene.toml"):
+        shutil.move(here / name, far / name)
+    run_sweep(far / "scene.toml", ["phi=0.15,0.16"], far / "sweep", quiet=True)
+    for name in ("phi=0.15", "phi=0.16"):
+        run_folder(far / "sweep" / name)
+        assert not (far / "sweep" / name / "failure.txt").exists()
+    assert (far / "sweep" / "phi=0.15" / "run" / "history.csv").read_bytes() == first
+    assert starts(far / "sweep") == ["begun", "begun", "resumed"]
+    mesh = plate()
+    mesh.points[30, 0] += 1e-9
+    write_mesh(far / "plate.vtu", mesh)
+    shutil.move(far / "plate.vtu", tmp_path / "plate.vtu")
+    shutil.move(far / "scene.toml", tmp_path / "scene.toml")
+    with pytest.raises(OutputError, match=r"holds a run on another mesh than .*plate\.vtu; choose another --out"):
+        run_sweep(tmp_path / "scene.toml", ["phi=0.15,0.16"], far / "sweep", quiet=True)
+    (tmp_path / "scene.toml").write_text((tmp_path / "scene.toml").read_text().replace("2 µs", "3 µs"))
+    with pytest.raises(OutputError, match="another sweep"):
+        run_sweep(tmp_path / "scene.toml", ["phi=0.15,0.16"], far / "sweep", quiet=True)
 
 
 # --- the ensemble that is shipped ---

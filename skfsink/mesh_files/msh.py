@@ -326,7 +326,8 @@ def _block_2(kind: int, nodes: np.ndarray, groups: np.ndarray, entities: np.ndar
     An element that is in one group twice is left as it is: there are two.
     """
     place = np.arange(len(nodes))
-    if len(np.unique(np.column_stack([entities, groups]), axis=0)) > len(np.unique(entities)):  # several of an entity
+    (own, entity), (others, group) = (np.unique(tags, return_inverse=True) for tags in (entities, groups))
+    if len(np.unique(entity.ravel() * len(others) + group.ravel())) > len(own):  # an entity has several groups
         rows = np.column_stack([np.sort(nodes, axis=1), entities])
         _, first, same = np.unique(rows, axis=0, return_index=True, return_inverse=True)
         if len(first) < len(rows) == len(np.unique(np.column_stack([rows, groups]), axis=0)):
@@ -363,11 +364,16 @@ def _agree(found: int, said: int, numbers: Any) -> None:
 
 
 def _see_that_all_is_there(msh: Msh, partitions: int) -> None:
-    """Raise Unreadable where elements of a partitioned mesh are in another file."""
+    """Raise Unreadable where elements of a partitioned mesh are in another file.
+
+    Version 4 says how many `partitions` there are. In version 2 (0) one is missing for sure where the numbers have a
+    gap, or where all elements are in one while nodes are missing.
+    """
     body = max((DIMENSION[block.kind] for block in msh.blocks), default=0)
     blocks = [block for block in msh.blocks if DIMENSION[block.kind] == body and len(block.nodes)]
-    found = set().union(*(block.parts for block in blocks))
+    found = frozenset[int]().union(*(block.parts for block in blocks))
     missing = set(range(1, min(max([partitions, *found]), 10**6) + 1)) - found
-    if found and (missing or found == {1}):
+    nodes_missing = len(msh.tags) and int(msh.tags.max()) > len(msh.tags)
+    if found and (missing or (not partitions and found == {1} and nodes_missing)):
         raise Unreadable(f"it holds part {', '.join(map(str, sorted(found)))} of a partitioned mesh, and other files "
                          "the rest; save it into one file, with Mesh.PartitionSplitMeshFiles = 0")
