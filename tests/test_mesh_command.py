@@ -260,8 +260,12 @@ def test_middle_nodes_are_the_middles_of_edges() -> None:
     points = np.vstack([mesh.points, middle])
     held = np.array([number[tuple(sorted(line))] for line in lines[mesh.cell_sets["top"][-1]].tolist()])
     ends = lines[mesh.cell_sets["top"][-1]].ravel()
-    new = split(meshio.Mesh(points, [("triangle6", np.array(rows)), ("line", lines)],
-                            cell_sets=mesh.cell_sets, point_sets={"held": np.append(held, ends), "ends": ends}))
+    sets = {name: [*members, np.zeros(0, int)] for name, members in mesh.cell_sets.items()}
+    sets["spot"] = [np.zeros(0, int), np.zeros(0, int), np.array([0])]
+    new = split(meshio.Mesh(points, [("triangle6", np.array(rows)), ("line", lines), ("vertex", held[:1, None])],
+                            cell_sets=sets, point_sets={"held": np.append(held, ends), "ends": ends}))
+    (spot,) = new.points[new.cells[2].data[0]]
+    assert spot[1] == 2.03
     sample = mesh_sample("curved", new)
     X = sample.space.X
     on = X[sample.nodes("top")]
@@ -295,6 +299,7 @@ def test_second_order_in_space(name: str) -> None:
     second = mesh_sample("second", split(meshio.Mesh(points, blocks, cell_sets=mesh.cell_sets, point_sets=sets)))
     first = mesh_sample("first", split(mesh))
     assert second.space.V.sum() == pytest.approx(1, rel=1e-13)
+    assert second.notes[0] == f"{len(number)} middle node(s) of elements of second order are corners now"
     for boundary in ("floor", "wall", "held", "outside"):
         assert sorted(map(tuple, np.round(second.space.X[second.nodes(boundary)], 9))) == sorted(
             map(tuple, np.round(first.space.X[first.nodes(boundary)], 9)))

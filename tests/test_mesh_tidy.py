@@ -241,17 +241,36 @@ def test_merging_along_a_chain(tmp_path: Path) -> None:
         merged("chain", mesh, 0.4)
 
 
-def test_a_slit_is_not_closed_in_silence() -> None:
-    """Fails if the faces of a slit are merged without a word of it."""
+def slit() -> meshio.Mesh:
+    """A square of 4 x 4 elements, with the coinciding faces of a slit at y = 1 for x up to 1."""
     mesh = beside(grid(4, 2), grid(4, 2, (0, 1)))
     nodes = np.flatnonzero(np.isclose(mesh.points[:, 1], 1) & (mesh.points[:, 0] > 1))
     one, two = nodes[:len(nodes) // 2], nodes[len(nodes) // 2:]
     for block in mesh.cells:  # grown together for x > 1
         block.data = np.where(np.isin(block.data, two), one[np.searchsorted(two, block.data).clip(max=len(one) - 1)],
                               block.data)
-    tidied(mesh)
-    notes = merged("slit", mesh, 1e-6).info["notes"]
+    return tidied(mesh)
+
+
+def test_a_slit_is_not_closed_in_silence() -> None:
+    """Fails if the faces of a slit are merged without a word of it."""
+    notes = merged("slit", slit(), 1e-6).info["notes"]
     assert notes[-1].startswith("3 of the merged node(s) joined a piece to itself, between (0, 1) and (1, 1) mm")
+
+
+def test_the_faces_of_a_slit_join_no_pieces(tmp_path: Path) -> None:
+    """Fails if nodes that coincide within a piece are counted as a cure."""
+    parts = slit(), grid(1, 1, (7, 7))
+    for part in parts:
+        part.cell_sets = {}
+    write_mesh(tmp_path / "slit.vtu", beside(*parts))
+    with pytest.raises(MeshError, match="and no nodes of theirs coincide"):
+        file_sample(tmp_path / "slit.vtu")
+    mesh = slit()
+    mesh.info = None
+    write_mesh(tmp_path / "slit.vtu", mesh)
+    sample = file_sample(tmp_path / "slit.vtu")  # and a slit is no piece, and no hinge
+    assert sample.notes == () and sample.space.n_nodes == 28
 
 
 def test_hinges(tmp_path: Path) -> None:

@@ -290,7 +290,7 @@ def _sets_of_nodes(mesh: meshio.Mesh, body: list[int], dim: int, edges: np.ndarr
             whole &= outer_edge
         given = np.isin(middle, nodes) & (middle >= 0)
         parts.append(n + np.flatnonzero(np.where(middle >= 0, given, whole)))
-        sets[name] = np.setdiff1d(np.unique(np.concatenate(parts)), middle[middle >= 0])
+        sets[name] = np.unique(np.concatenate(parts))  # those that are middle nodes go with them
     return sets
 
 
