@@ -64,6 +64,7 @@ class Recorder:
         quasistatic = controls.analysis == "quasistatic"
         self.guard = Guard(scene, momentum)
         self.guard.scale = self.onset.get("elastic_energy", 0.0)
+        self.guard.overlaps = list(memory.get("overlaps", []))
         self._waiting = controls.start == "rest"
         self._record_every = 1.0 if quasistatic else controls.record_every
         self._frame_every = 10.0 if quasistatic else controls.frame_every
@@ -71,6 +72,7 @@ class Recorder:
     # --- loading ---
     def loading(self, state: State, reaction: np.ndarray) -> None:
         """Row of a load increment."""
+        self.guard.check_overlap(state)
         self.history.append(self._row(state, reaction, self.tips, 0.0))
 
     def reached_onset(self, state: State, reaction: np.ndarray) -> None:
@@ -124,6 +126,7 @@ class Recorder:
         """Last row and frame, and the log of deleted elements."""
         self._record(state, reaction, dt)
         self.frame(state, "end")
+        self.guard.check_end()
         self.series.flush()
         log = "".join(f"{time!r},{element}\n" for time, element in state.deletions)
         write_atomic(self.history.path.with_name("deletions.csv"), "time_s,element\n" + log)
@@ -131,6 +134,7 @@ class Recorder:
     def frame(self, state: State, label: str) -> None:
         """Add the state to the ParaView series."""
         momentum, space = self.momentum, self.scene.sample.space
+        self.guard.check_overlap(state)
         if label:
             self.moments[label] = len(self.frames)
         self.frames.append((state.time, label))
@@ -170,4 +174,5 @@ class Recorder:
         """What goes into a checkpoint as JSON; the tracker's arrays go beside it."""
         self.series.flush()  # a checkpoint names its frames
         return {"rows": self.history.rows, "frames": self.frames, "moments": self.moments, "onset": self.onset,
-                "at_arrival": self.at_arrival, "separated_at": self.separated_at}
+                "at_arrival": self.at_arrival, "separated_at": self.separated_at,
+                "overlaps": self.guard.overlaps}
