@@ -278,9 +278,18 @@ class Guard:
         first, most = self.overlaps or (found.depth, found.depth)
         self.overlaps = [first, max(most, found.depth)]
         log.warning("faces pass through each other by %.3g mm at %s, near %s mm of the undeformed body (%.2g of the "
-                    "element there): there is no contact, and from then on it is not the body that is meant; end the "
+                    "element there): there is no contact, and what follows is a body that reaches into itself; end the "
                     "loading before they meet, or give the notch more width", found.depth, self._when(state),
                     _place(found.place), found.depth / found.size)
+
+    def check_stress(self, state: State, crushed: np.ndarray) -> None:
+        """Elements, a mask (ne,), whose stress is unknown, see :func:`.cauchy_stress`."""
+        if crushed.any():
+            first = self.space.conn[int(np.argmax(crushed))]
+            log.warning("the stress of %d element(s) is not known at %s, as of one near %s mm: a point that exerts a "
+                        "force is crushed or inside out there; frames have NaN for it, and 1 in the field crushed. Refine "
+                        "the mesh where it is pressed, or raise --force-floor", crushed.sum(), self._when(state),
+                        _place(self.space.X[first].mean(axis=0)))
 
     def check_end(self) -> None:
         """Say to what depth faces have passed through each other, if that was more than when it was first seen."""

@@ -16,6 +16,7 @@ LIVE = 0.5        # gamma of all nodes of an element that counts: further down i
 SLIGHT = 0.05     # of the size of an element: faces that slide along each other, or rounding, stay below it
 MOST = 400        # nodes whose depth is measured, picked evenly if there are more
 _CHUNK = 2_000_000           # pairs of nodes and facets at a time
+_ROUNDING = 1e-6             # of the size of an element
 _SMOOTH = 3                  # rings of facets over which the outward direction at a node is a mean
 _CELLS = {2: 512, 3: 96}     # of the grid in which nodes are looked for, along its longest side
 
@@ -125,6 +126,8 @@ def _boxed(x, conn, nodes, order, begin, first, width, shape):  # type: ignore[n
             for a in range(1, na):
                 low[d] = min(low[d], x[conn[e, a], d])
                 high[d] = max(high[d], x[conn[e, a], d])
+            slack = _ROUNDING * (high[d] - low[d])
+            low[d], high[d] = low[d] - slack, high[d] + slack
             start[d] = min(max(np.floor((low[d] - first[d]) / width), 0), shape[d] - 1)
             stop[d] = min(max(np.floor((high[d] - first[d]) / width), 0), shape[d] - 1)
         for k in range(start[2], stop[2] + 1):
@@ -134,7 +137,7 @@ def _boxed(x, conn, nodes, order, begin, first, width, shape):  # type: ignore[n
                     p = nodes[order[i]]
                     inside = True
                     for d in range(dim):
-                        inside = inside and low[d] < x[p, d] < high[d]
+                        inside = inside and low[d] <= x[p, d] <= high[d]
                     if not inside:
                         continue
                     for a in range(na):
@@ -165,7 +168,7 @@ def _in_element(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
         singular = np.abs(np.linalg.det(J)) < 1e-12 * scale**dim
         J[singular] = np.eye(dim) * scale[singular, None, None]
         xi = np.clip(xi + np.linalg.solve(J, gap[..., None])[..., 0], -0.5, 1.5)
-    return (error <= 1e-6 * scale) & (xi >= 0).all(axis=1) & (xi <= 1).all(axis=1)
+    return (error <= _ROUNDING * scale) & (np.abs(xi - 0.5) <= 0.5 + _ROUNDING).all(axis=1)
 
 
 def _depth(x: np.ndarray, faces: np.ndarray, nodes: np.ndarray) -> np.ndarray:
@@ -181,12 +184,13 @@ def _depth(x: np.ndarray, faces: np.ndarray, nodes: np.ndarray) -> np.ndarray:
         out = np.column_stack([np.bincount(faces.ravel(), np.repeat(part, faces.shape[1]), len(x))
                                for part in around.T])
         around = out[faces].sum(axis=1)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    level = np.einsum("fi,fi->f", corners[:, 0], normal) + _ROUNDING * np.ptp(corners, axis=1).max(axis=1)
     depth = np.empty(len(nodes))
     step = max(1, _CHUNK // max(1, len(faces)))
     for start in range(0, len(nodes), step):
         some = nodes[start:start + step]
-        row, column = np.nonzero((out[some] @ normal.T < 0)
-                                 & (x[some] @ normal.T < np.einsum("fi,fi->f", corners[:, 0], normal)))
+        row, column = np.nonzero((out[some] @ normal.T < 0) & (x[some] @ normal.T <= level))
         least = np.full(len(some), np.inf)
         np.minimum.at(least, row, _distance(x[some[row]], corners[column]))
         depth[start:start + step] = np.where(np.isfinite(least), least, 0.0)

@@ -11,6 +11,7 @@ from .crack import CrackTracker, Tips
 from .density import DensitySolver
 from .gauge import Gauge
 from .guards import Guard
+from .history import deletions_header
 from .loading import Loading
 from .momentum import Momentum
 from .output import History, Series, prepare_folder, write_atomic
@@ -42,7 +43,9 @@ class Recorder:
         names = [*(grip.boundary for grip in scene.grips), *(traction.boundary for traction in scene.tractions)]
         held = [sample.nodes(name) for name in dict.fromkeys(names)]
         # a tip in the slowest material has to have moved between two looks at it
-        self.tracker = CrackTracker(space, scene.sink_law.length_scale, momentum.shear_wave_speeds[0], held,
+        self.clock = "sweep" if scene.controls.analysis == "quasistatic" else "s"   #: unit of the time of the event
+        self.tracker = CrackTracker(space, scene.sink_law.length_scale,
+                                    momentum.shear_wave_speeds[0] if self.clock == "s" else None, held,
                                     sample.rim(*scene.faces))
         self._cells = {"region": scene.region_numbers} if scene.regions else {}
         if memory is None:
@@ -55,7 +58,7 @@ class Recorder:
         self.moments: dict[str, int] = dict(memory["moments"])
         self.onset: dict[str, float] = dict(memory["onset"])
         self.at_arrival: dict[str, float] = dict(memory["at_arrival"])
-        self.separated_at = float(memory.get("separated_at", np.inf))   #: first record after the separation [s]
+        self.separated_at = float(memory.get("separated_at", np.inf))   #: first record after the separation [s, or sweep]
         self.series.resume(len(self.frames))  # this may refuse, before any file is touched
         self.history = History(folder / "history.csv", memory["rows"], space.dim)
         self._marked: np.ndarray | None = None  # gamma when the tracker last looked; a solve makes a new array
@@ -128,8 +131,9 @@ class Recorder:
         self.frame(state, "end")
         self.guard.check_end()
         self.series.flush()
-        log = "".join(f"{time!r},{element}\n" for time, element in state.deletions)
-        write_atomic(self.history.path.with_name("deletions.csv"), "time_s,element\n" + log)
+        log = "".join(f"{int(time) if self.clock == 'sweep' else time!r},{element}\n"
+                      for time, element in state.deletions)
+        write_atomic(self.history.path.with_name("deletions.csv"), ",".join(deletions_header(self.clock)) + "\n" + log)
 
     def frame(self, state: State, label: str) -> None:
         """Add the state to the ParaView series."""
@@ -139,12 +143,14 @@ class Recorder:
             self.moments[label] = len(self.frames)
         self.frames.append((state.time, label))
         stress = cauchy_stress(momentum, state.u)
+        crushed = np.isnan(stress).any(axis=1)
+        self.guard.check_stress(state, crushed)
         self.series.add(
             state.time,
             {"displacement": state.u, "velocity": state.v, "gamma": state.gamma},
             {"deleted": state.deleted.astype(np.int8), "W": space.element_mean(np.minimum(momentum.W, 1e3)),
              "gamma_element": space.element_mean(momentum.gamma), "stress": stress, "pressure": pressure(stress),
-             "von_mises": von_mises(stress), **self._cells})
+             "von_mises": von_mises(stress), "crushed": crushed.astype(np.int8), **self._cells})
 
     def _record(self, state: State, reaction: np.ndarray, dt: float) -> None:
         self.tips = self.tracker.look(state.time, state.gamma)

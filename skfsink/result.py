@@ -1,4 +1,4 @@
-"""The result of a run: its summary (schema version 1), its history and its last state."""
+"""The result of a run: its summary (schema version 2), its history and its last state."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from .history import history_units, load_name
 from .output import versions
 from .quantities import measured
 from .scene import Scene
@@ -18,7 +19,7 @@ from .state import State
 
 __all__ = ["SCHEMA", "Result", "summarize"]
 
-SCHEMA = 1
+SCHEMA = 2   # 1 had "reaction_N_per_mm" for the force [N] on bodies in space, and no "units"
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,14 +55,16 @@ def summarize(scene: Scene, simulation: Simulation) -> dict[str, Any]:
     ledger, onset, tracker = state.ledger, recorder.onset, recorder.tracker
     space, cost = scene.sample.space, simulation.cost()
     dynamic = scene.controls.analysis == "dynamic"
-    scale = onset["elastic_energy"]
+    scale, units = onset["elastic_energy"], history_units(space.dim)
     balances = [abs(row["balance"]) for row in recorder.history.rows if row["phase"] != "loading"]
     return {
         "schema": SCHEMA, "case": scene.case, "mesh": scene.sample.name, "analysis": scene.controls.analysis,
         "integrator": scene.controls.integrator if dynamic else None,
         "elements": space.n_elements, "dofs": int(simulation.free.sum()) + space.n_nodes,
         "unknowns": {"displacement": int(simulation.free.sum()), "density": space.n_nodes},
-        "onset": {k: onset[k] for k in ("displacement_mm", "reaction_N_per_mm", "elastic_energy", "gamma_min")},
+        "units": {"load": units["reaction_N_per_mm"], "energy": units["elastic"]},
+        "onset": {"displacement_mm": onset["displacement_mm"], load_name(space.dim): onset["reaction_N_per_mm"],
+                  "elastic_energy": onset["elastic_energy"], "gamma_min": onset["gamma_min"]},
         "event": {"first_arrival_s": tracker.arrival if dynamic else None,
                   "first_arrival_sweep": None if dynamic else tracker.arrival,
                   "mean_tip_speed_m_per_s": tracker.mean_speed() if dynamic else None,

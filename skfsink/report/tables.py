@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..history import onset_load
 from ..loader import ENERGIES, Run
 
 __all__ = ["Row", "Table", "cost_table", "energy_tables", "key_table", "number", "version_table"]
@@ -104,7 +105,7 @@ def key_table(runs: Sequence[Run], labels: Sequence[str], waves: Sequence[tuple[
 
     rows = [
         row("displacement of the grips at the onset", "mm", "onset", "displacement_mm"),
-        row("load at the onset", force, "onset", "reaction_N_per_mm"),
+        _row("load at the onset", force, [onset_load(_get(run, "onset") or {}) for run in runs]),
         row("elastic energy at the onset", energy, "onset", "elastic_energy"),
         row("first arrival of the crack at an edge", "µs", "event", "first_arrival_s", factor=1e6),
         row("first arrival of the crack at an edge", "sweep", "event", "first_arrival_sweep"),
