@@ -5,21 +5,21 @@ from __future__ import annotations
 import numpy as np
 from bodies import grid
 
-from skfsink.crack import CrackTracker, Plane
+from skfsink.crack import ADVANCES, CrackTracker, Plane
 from skfsink.space import Space
 
 L, CS = 0.1, 30.0  # length scale [mm], shear wave speed [m/s]
 H = 0.05           # element size [mm]
 
 
-def tracker(kind: str = "quad") -> tuple[CrackTracker, Space]:
+def tracker(kind: str = "quad", shear_wave_speed: float | None = CS) -> tuple[CrackTracker, Space]:
     """A plate of 2 x 1 mm (in space: one element thick), held at y = 0 and y = 1."""
     shape = (40, 20) if kind == "quad" else (40, 20, 1)
     space = Space(grid(kind, shape, (2.0, 1.0, 0.1)[:len(shape)]))
     X = space.X
     rim = np.flatnonzero((X[:, 0] < 1e-9) | (X[:, 0] > 2 - 1e-9) | (X[:, 1] < 1e-9) | (X[:, 1] > 1 - 1e-9))
     grips = [np.flatnonzero(X[:, 1] < 1e-9), np.flatnonzero(X[:, 1] > 1 - 1e-9)]
-    return CrackTracker(space, L, CS, grips, rim), space
+    return CrackTracker(space, L, shear_wave_speed, grips, rim), space
 
 
 def line(space: Space, x0: float, x1: float, y: float = 0.5) -> np.ndarray:
@@ -80,6 +80,20 @@ def test_branches_and_tip_speed() -> None:
         forked[arm | np.roll(arm, 1)] = 0.0
     track.mark(41e-6, forked)
     assert track.look(41e-6, forked).branches == 2
+
+
+def test_a_clock_of_sweeps_is_no_time() -> None:
+    """Fails if ages in sweeps are compared with seconds, or a speed is made of sweeps."""
+    track, space = tracker(shear_wave_speed=None)
+    for sweep in range(1, 6):
+        gamma = line(space, 0, 0.1 * sweep)
+        track.mark(float(sweep), gamma)
+        tips = track.look(float(sweep), gamma)
+        assert (tips.active, tips.speed) == (1, 0.0)
+    assert track.look(5.0 + ADVANCES - 1, gamma).active == 1
+    arrested = track.look(5.0 + ADVANCES, gamma)
+    assert (arrested.active, arrested.branches) == (0, 1)
+    assert track.mean_speed() is None
 
 
 def test_leading_tip_is_kept_where_it_forks() -> None:

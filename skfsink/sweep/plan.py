@@ -22,7 +22,7 @@ from ..simulate import Interrupted
 from ..tables import split
 from .engine import here, on_scheduler
 from .one import DECK, FAILURE, RUN, finished
-from .table import draw, read_rows, write_csv, write_parquet
+from .table import draw, read_rows, read_units, write_csv, write_parquet
 from .vary import combinations, read_variation
 
 __all__ = ["run_sweep"]
@@ -62,12 +62,12 @@ def run_sweep(path: Path, vary: Sequence[str], out: Path, jobs: int = 1, schedul
         except KeyboardInterrupt:
             raise Interrupted(f"interrupted with {done} of {len(folders)} runs done; the same command goes on"
                               ) from None
-        rows = read_rows(folders, varied)
-        write_csv(rows, out / "sweep.csv")
+        rows, units = read_rows(folders, varied), read_units(folders)
+        write_csv(rows, out / "sweep.csv", units)
         if parquet:
-            write_parquet(rows, out / "sweep.parquet")
+            write_parquet(rows, out / "sweep.parquet", units)
         if any(row["analysis"] for row in rows):
-            draw(rows, names, out / "sweep.png")
+            draw(rows, names, out / "sweep.png", units)
         display.update(1.0, str(out))
     return rows
 
