@@ -221,7 +221,7 @@ def _from_meshio(name: str, data: meshio.Mesh, made: bool = False, source: str =
     except MeshError as error:
         raise MeshError(f"mesh {shown}: {error}") from None
     return Sample(info.get("name") or Path(name).stem, space, _boundaries(data, facet), info.get("made", made),
-                  _elements(data, kind), info.get("source", source))
+                  cells=_elements(data, kind), source=info.get("source", source))
 
 
 def _elements(data: meshio.Mesh, kind: str) -> dict[str, np.ndarray]:
