@@ -106,7 +106,7 @@ class Guard:
         self.step_share: Callable[[], float] = lambda: np.inf  #: explicit step over its stability limit, now
         self._deleted = -1   # elements at the last step
         self._inside_out = False
-        self.overlaps: list[float] = []  #: depth [mm] to which faces overlapped when that was first seen, and the greatest
+        self.overlaps: list[float] = []  #: depth [mm] of an overlap of faces when it was first seen, and the greatest
 
     @property
     def _step_cure(self) -> str:
@@ -325,8 +325,8 @@ class Guard:
         if crushed.any():
             first = self.space.conn[int(np.argmax(crushed))]
             log.warning("the stress of %d element(s) is not known at %s, as of one near %s mm: a point that exerts a "
-                        "force is crushed or inside out there; frames have NaN for it, and 1 in the field crushed. Refine "
-                        "the mesh where it is pressed, or raise --force-floor", crushed.sum(), self._when(state),
+                        "force is crushed or inside out there; frames have NaN for it, and 1 in the field crushed; "
+                        "refine the mesh where it is pressed, or raise --force-floor", crushed.sum(), self._when(state),
                         _place(self.space.X[first].mean(axis=0)))
 
     def check_end(self) -> None:

@@ -29,23 +29,23 @@ class Overlap(NamedTuple):
     depth: greatest distance of a node of the surface from the face it has passed through [mm].
     place: that node on the undeformed body [mm], (dim,).
     size: h of the element it lies in [mm].
-    count: nodes of the surface that lie inside of the body.
+    inside: number of nodes of the surface that lie inside of the body.
     """
 
     depth: float
     place: np.ndarray
     size: float
-    count: int
+    inside: int
 
 
 def overlap(space: Space, u: np.ndarray, gamma: np.ndarray, deleted: np.ndarray) -> Overlap | None:
     """Where the body that is left passes through itself at the displacement `u` (n, dim); None where it does not.
 
-    The body are the elements that are not `deleted` (ne,) and whose nodes all have a relative density `gamma` (n,) of
-    at least `LIVE`; its surface are its outer facets, those along a notch and the lips of a crack. A node of the surface
-    that lies in an element which does not have it shows that two faces have passed through each other, unless an element
-    that has the node is inside out. The depth is the distance to the nearest facet that looks the other way: exact between plane faces, otherwise
-    to the error of the chords of the mesh. Less than `SLIGHT` of an element is none.
+    The body is made of the elements that are not `deleted` (ne,) and whose nodes all have a relative density `gamma`
+    (n,) of at least `LIVE`; its surface of their outer facets, along a notch or a crack too. A node of the surface that
+    lies in an element which does not have it shows that two faces have passed through each other, unless an element
+    that has the node is inside out. The depth is the distance to the nearest facet that looks the other way: exact
+    between plane faces, otherwise to the error of the chords of the mesh. Less than `SLIGHT` of an element is none.
 
     Faces that meet the mirror image of the body at a plane of symmetry are not seen.
     """

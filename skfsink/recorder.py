@@ -71,7 +71,7 @@ class Recorder:
         self.moments: dict[str, int] = dict(memory["moments"])
         self.onset: dict[str, Any] = dict(memory["onset"])
         self.at_arrival: dict[str, float] = dict(memory["at_arrival"])
-        self.separated_at = float(memory.get("separated_at", np.inf))   #: first record after the separation [s, or sweep]
+        self.separated_at = float(memory.get("separated_at", np.inf))   #: record of the separation [s, or sweep]
         self.series.resume(len(self.frames))  # this may refuse, before any file is touched
         self.loading_series.resume(len(self.loading_frames))
         self.history = History(folder / "history.csv", memory["rows"], space.dim)

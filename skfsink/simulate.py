@@ -144,7 +144,8 @@ class Simulation:
             started = True
             done = 0.5 * min(1.0, tolerance * state.grip / (loading.increment or np.inf)) ** 0.25
             self.display.update(done, f"grips {self.recorder.gauge.displacement(state):.4f} mm  load "
-                                      f"{self.recorder.load(reaction):.4f} {self._unit}  least γ {state.gamma.min():.3f}")
+                                      f"{self.recorder.load(reaction):.4f} {self._unit}  "
+                                      f"least γ {state.gamma.min():.3f}")
             self._pause("loading")
         self._lap("loading")
         if self.unfailed:
@@ -242,8 +243,9 @@ class Simulation:
         size = float((self.scene.sample.space.X.max(axis=0) - self.scene.sample.space.X.min(axis=0)).max())
         load = self.recorder.history.rows[-1]["reaction_N_per_mm"]
         self.display.update(max(fraction, 0.9 * tips.length / size), (
-            f"{clock}  tip {tips.position[0]:.2f}, {tips.position[1]:.2f} mm ×{tips.branches}  load {load:.3f} {self._unit}  "
-            f"elastic {ledger.elastic:.4f} kinetic {ledger.kinetic:.4f} D {ledger.sink:.4f} U {ledger.paper:.4f}"))
+            f"{clock}  tip {tips.position[0]:.2f}, {tips.position[1]:.2f} mm ×{tips.branches}  "
+            f"load {load:.3f} {self._unit}  elastic {ledger.elastic:.4f} kinetic {ledger.kinetic:.4f} "
+            f"D {ledger.sink:.4f} U {ledger.paper:.4f}"))
 
     @property
     def _unit(self) -> str:

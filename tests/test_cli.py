@@ -215,7 +215,7 @@ def check_files(folder: Path, summary: dict[str, object]) -> None:
 
 
 def test_files_of_both_analyses(mesh: Path, tmp_path: Path) -> None:
-    """Fails if a file is missing, a key of schema 1 is, or a separated plate is not reported as such."""
+    """Fails if a file is missing, a key of schema 2 is, or a separated plate is not reported as such."""
     out = tmp_path / "a [b] c"  # a name that is markup to rich
     status, err, _ = invoke("--mesh", mesh, "--out", out, "--analysis", "both", "--frame-every", "2e-5", *SMALL)
     assert (status, err) == (0, "")
@@ -225,8 +225,8 @@ def test_files_of_both_analyses(mesh: Path, tmp_path: Path) -> None:
     for analysis in ("dynamic", "quasistatic"):
         part = summary[analysis]
         check_files(out / analysis, part)
-        assert set(part) >= {"schema", "case", "mesh", "analysis", "integrator", "elements", "dofs", "onset", "event",
-                             "energy", "deleted_elements", "cost", "versions", "assumed"}
+        assert set(part) >= {"schema", "case", "mesh", "analysis", "integrator", "elements", "dofs", "units", "onset",
+                             "event", "energy", "deleted_elements", "cost", "versions", "assumed"}
         assert set(part["onset"]) >= {"displacement_mm", "reaction_N_per_mm", "elastic_energy"}
         assert set(part["event"]) >= {"first_arrival_s", "mean_tip_speed_m_per_s", "max_branches", "separated"}
         assert set(part["energy"]) >= {

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import skfem
-from guarded import SHARP, Watched, scene
+from guarded import NOTCHED, SHARP, Watched, scene
 
 from skfsink.energy import Ledger
 from skfsink.errors import InstabilityError
@@ -110,6 +110,49 @@ def test_alternating_pressures_are_warned_of(caplog: pytest.LogCaptureFixture):
     watched.state.u[:, 0] += 2e-4 * np.where((i // 1 + j // 2) % 2, 1, -1)
     watched.guard.check_onset(watched.state)
     assert "a checkerboard" in caplog.text and "break up the rows of the mesh" in caplog.text
+
+
+def pressed_shut(by: float) -> Watched:
+    """A plate with a notch, whose upper half is moved down by `by` [mm]."""
+    watched = Watched(NOTCHED.scene)
+    X = watched.scene.sample.space.X
+    watched.state.u = np.zeros_like(X)
+    watched.state.u[X[:, 1] > 0.5, 1] = -by * np.clip((1 - X[X[:, 1] > 0.5, 0]) / 0.6, 0, 1)
+    return watched
+
+
+def test_faces_that_pass_each_other_are_warned_of(caplog: pytest.LogCaptureFixture):
+    """Fails if a notch pressed shut is not warned of with depth and time, or one that stays open is; or if the end
+    does not say that it went further, or says so where it did not."""
+    X = NOTCHED.scene.sample.space.X
+    notch = X[(X[:, 0] < 0.3) & (np.abs(X[:, 1] - 0.5) < 0.1)]
+    width = float(np.ptp(notch[np.abs(notch[:, 1] - 0.5) < 0.07, 1]))
+    watched = pressed_shut(0.9 * width)
+    watched.guard.check_overlap(watched.state)
+    watched.guard.check_end()
+    assert not caplog.messages
+    for extra in (0.02, 0.025):
+        watched.state.u = pressed_shut(width + extra).state.u
+        watched.guard.check_overlap(watched.state)
+    watched.guard.check_end()
+    assert len(caplog.messages) == 2
+    assert re.match(r"faces pass through each other by 0.02 mm at t = 0 s, near \(\d", caplog.messages[0])
+    assert "there is no contact" in caplog.messages[0]
+    watched.state.u = pressed_shut(width + 0.05).state.u
+    watched.guard.check_overlap(watched.state)
+    watched.guard.check_end()
+    assert caplog.messages[-1].startswith("faces have passed through each other by up to 0.05 mm")
+
+
+def test_crushed_elements_are_told(caplog: pytest.LogCaptureFixture):
+    """Fails if elements without a stress are not counted."""
+    watched = Watched()
+    crushed = np.zeros(watched.guard.space.n_elements, bool)
+    watched.guard.check_stress(watched.state, crushed)
+    assert not caplog.messages
+    crushed[[3, 7]] = True
+    watched.guard.check_stress(watched.state, crushed)
+    assert caplog.messages[0].startswith("the stress of 2 element(s) is not known")
 
 
 def set_ledger(**entries: float) -> Callable[[Watched], None]:

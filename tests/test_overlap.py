@@ -64,7 +64,7 @@ def test_the_depth_of_plane_faces(kind: str, depth: float, coarse: bool, turned:
     assert found is not None
     assert found.depth == pytest.approx(depth, rel=1e-6)
     assert found.place[0] <= 0.4 + 1e-9 and abs(found.place[1] - 0.5) <= WIDTH / 2 + 1e-9
-    assert found.count >= (3 if kind == "quad" else 15)
+    assert found.inside >= (3 if kind == "quad" else 15)
 
 
 @pytest.mark.parametrize("by", [-0.3, 0.0, 0.5 * WIDTH, 0.999 * WIDTH, WIDTH, WIDTH + 1e-3])

@@ -64,6 +64,13 @@ def test_loaded_results_are_those_in_the_files(folder: Path) -> None:
         assert (run.event["phase"] == "event").all()
         assert len(run.deletions.element) == run.summary["deleted_elements"] == len(set(run.deletions.element))
         assert (np.diff(run.deletions.time) >= 0).all()
+        clock, last = ("s", run.event["time_s"][-1]) if run.analysis == "dynamic" else ("sweep", run.event["step"][-1])
+        assert run.clock == clock and 0 < run.deletions.time[-1] <= last == run.frames.times[-1]
+        log = (run.folder / "deletions.csv").read_text()
+        assert log.splitlines()[0] == ("time_s,element" if clock == "s" else "sweep,element")
+        assert run.summary["units"] == {"load": "N/mm", "energy": "N mm/mm"}
+        crushed = run.frames.frame("end").cell_data["crushed"][0]
+        np.testing.assert_array_equal(crushed == 1, np.isnan(run.frames.frame("end").cell_data["von_mises"][0]))
         energy, energies = run.summary["energy"], run.energies
         assert list(energies) == [name for name, _, _ in ENERGIES]
         assert energies["U"].arrival == energy["U_paper_at_arrival"] and energies["U"].end == energy["U_paper_final"]
@@ -129,6 +136,8 @@ def test_unfinished_and_damaged_runs(copy: Path) -> None:
     (copy / "history.csv").write_text("".join((copy / "history.csv").read_text().splitlines(True)[:3]))
     with pytest.raises(OutputError, match=r"has not come to its event yet: there is nothing to report$"):
         report_page([skfsink.load(copy)])
+    (copy / "deletions.csv").write_text("time_s,element\n3.0,7\n")  # as formerly of sweeps too
+    assert (skfsink.load(copy).deletions.time, skfsink.load(copy).deletions.element) == (3.0, 7)
     for name, read in (("deletions.csv", "deletions"), ("history.csv", "history")):
         (copy / name).write_text("time_s,element\n1,2,3\n")
         with pytest.raises(OutputError, match=f"{name} is .*damaged$"):
