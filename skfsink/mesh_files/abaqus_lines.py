@@ -176,7 +176,7 @@ def is_keyword_file(path: Path) -> bool:
     """Whether the first line of a file that is not empty is a keyword or a comment of Abaqus."""
     with path.open("rb") as file:
         begin = file.read(4096)
-    return _decoded(begin[:len(begin) // 2 * 2]).lstrip("\ufeff \t\r\n\f").startswith("*")
+    return _decoded(begin).lstrip("\ufeff \t\r\n\f").startswith("*")
 
 
 def file_size(path: Path, largest: int = LARGEST) -> int:

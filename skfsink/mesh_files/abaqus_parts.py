@@ -111,6 +111,8 @@ class Part:
         if not self.nodes:
             return np.zeros(0, np.int64), np.zeros((0, 3))
         numbers, points = np.concatenate([n for n, _ in self.nodes]), np.concatenate([x for _, x in self.nodes])
+        if (np.diff(numbers) > 0).all():
+            return numbers, points
         kept, first, inverse = np.unique(numbers, return_index=True, return_inverse=True)
         if len(kept) < len(numbers):
             apart = (points[first][inverse] != points).any(axis=1)
