@@ -133,15 +133,16 @@ def refuse(scene: Scene) -> None:
     loading = scene.loading()
     if _dynamic(scene):
         _refuse_events(scene, loading)
-    count = int(pieces(space).max()) + 1
+    label = pieces(space)
+    count = int(label.max()) + 1
     if count > PIECES:
         raise ParameterError(f"the mesh is in {count} pieces that share no side (at most {PIECES}): merge nodes that "
                              f"coincide")
-    for motion in free_motions(space, loading.free):
+    for motion in free_motions(space, loading.free, label):
         if motion.unheld:
             raise ParameterError(f"nothing holds {motion.piece}: its nodes are in no grip, nor joined to a piece that "
                                  f"is held; merge nodes that coincide, or hold it at a boundary")
-    if not scene.tractions and moves_as_a_whole(space, loading):
+    if not scene.tractions and moves_as_a_whole(space, loading, label):
         whole = "the body" if count == 1 else f"each of the {count} pieces of the body, which are not joined,"
         raise ParameterError(f"the grips move {whole} as a whole and strain nothing: hold another boundary in the "
                              f"direction of the one that moves{', or merge nodes that coincide' if count > 1 else ''}")
@@ -213,10 +214,12 @@ def warn(scene: Scene, folder: Path) -> None:
     for part in scene.parts:
         _warn_of_material(scene, part)
     loading = scene.loading()
-    for motion in free_motions(space, loading.free):
-        if not motion.unheld:
-            log.warning("the grips leave %s free to %s: it may drift or turn as it is loaded, which displacements and "
-                        "pictures show; %s", motion.piece, motion.name, motion.cure)
+    motions = [motion for motion in free_motions(space, loading.free) if not motion.unheld]
+    if motions:
+        log.warning("the grips leave %s%s: it may drift or turn as it is loaded, which displacements and pictures "
+                    "show; %s", ", and ".join(f"{m.piece} free to {m.name}" for m in motions[:3]),
+                    f", and {len(motions) - 3} more motions" if len(motions) > 3 else "",
+                    "; ".join(dict.fromkeys(m.cure for m in motions)))
     if _dynamic(scene):
         _warn_of_events(scene, loading, folder)
 

@@ -26,6 +26,9 @@ __all__ = ["Ledger"]
 class Ledger:
     """Energies [N mm; N mm/mm in 2D] since the start of the phase it belongs to.
 
+    Memory: all entries: `drop` books on, and `sink`, `balance`, `error` and `as_dict` sum up what has been booked so
+    far.
+
     Attributes
     ----------
     initial: elastic and kinetic energy, and potential of the dead loads, at the start of the ledger.

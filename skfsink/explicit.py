@@ -68,6 +68,10 @@ class ExplicitControls:
 class Explicit:
     """Integrates a :class:`State` from onset on.
 
+    Memory: step size and frequency estimate, forces, masses, the history in tiles, and active zones, all of the state
+    last stepped: after `begin`, `start` or `restore`, `run`, `step`, `update_density`, `sync` and `step_share` go on
+    with that one state; `memory` gives what a checkpoint needs.
+
     Parameters
     ----------
     momentum, density: the two fields.

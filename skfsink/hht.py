@@ -51,6 +51,10 @@ class _Trial(NamedTuple):
 class HHT:
     """Integrates a :class:`State`; see the module for the scheme.
 
+    Memory: step size, forces, inertia and masses of the last accepted state: after `begin`, `start` or `restore`, `run`
+    and `step` go on with that one state; `memory` gives what a checkpoint needs. An attempt that is given up leaves
+    nothing behind but a shorter step.
+
     Parameters
     ----------
     momentum, density: the two fields.

@@ -77,6 +77,10 @@ class _Settled(NamedTuple):
 class StaticLoading:
     """Equilibria of a body between grips.
 
+    Memory: the next increment and the factors of :class:`.Newton`; `load` goes on from them, `stable` uses the factors,
+    `memory` gives both. Of an increment that is given up only its length and these factors are left; the fields are
+    those of the state.
+
     Parameters
     ----------
     momentum, density: the two fields.

@@ -25,6 +25,7 @@ log = logging.getLogger(__name__)
 
 FLAT = 1e-6        # of the size of the body: nodes that are in a plane
 EVEN = 0.05        # spread of 1 - gamma, of its greatest value, below which a body fails everywhere at once
+SIDE = 0.4         # of the nodes of the surface: a boundary with more of them tells nothing about a place
 AWAY = 3.0         # distance from a notch, in l, from which on a failure is not at it
 SHARP = 25.0       # degrees: a surface that turns by as much at a node is a notch, not a fillet
 NOTCHES = ("notch", "crack", "slit", "hole", "cut", "flaw")  # words in names of boundaries
@@ -85,8 +86,8 @@ def clamps(scene: Scene) -> list[str]:
 def beginning(scene: Scene, state: State) -> dict[str, Any]:
     """Where the body begins to fail: `place_mm` of the weakest node, and the `boundary` there.
 
-    That is the named boundary nearest to it within l; "surface" or "inside" if there is none, by whether the surface
-    is within l; "everywhere" if all are as weak.
+    That is the named boundary nearest to it within l, no plane of symmetry and no side of a sheet; "surface" or
+    "inside" if there is none, by whether the rim is within l; "everywhere" if all nodes are as weak.
     """
     weakest = int(np.argmin(state.gamma))
     return {"place_mm": scene.sample.space.X[weakest].tolist(), "boundary": _boundary_at(scene, state, weakest)}
@@ -98,10 +99,11 @@ def _boundary_at(scene: Scene, state: State, node: int) -> str:
         return "everywhere"
     grips = {grip.boundary for grip in scene.grips}
     limit = scene.sink_law.length_scale * (1 + 1e-9)
-    x, X = sample.space.X[node], sample.space.X
-    best = (limit, 3, len(X), "surface" if _distance(X[outer], x) <= limit else "inside")
+    x, X, rim = sample.space.X[node], sample.space.X, rim_of(scene)[0]
+    others = {*scene.faces, *(name for name, _ in symmetry_planes(scene))}
+    best = (limit, 3, len(X), "surface" if rim.size and _distance(X[rim], x) <= limit else "inside")
     for name, nodes in sample.boundaries.items():
-        if not nodes.size or name in scene.faces or not outer[nodes].all():
+        if not nodes.size or name in others or not outer[nodes].all() or nodes.size > SIDE * outer.sum():
             continue
         kind = 0 if _is_notch(name) else 1 if name in grips else 2
         distance = _distance(X[nodes], x)

@@ -11,6 +11,7 @@ from .crack import CrackTracker, Tips
 from .density import DensitySolver
 from .gauge import Gauge
 from .guards import Guard
+from .history import deletions_header
 from .loading import Loading
 from .material_point import mean_deformation, mean_stress
 from .momentum import Momentum
@@ -27,6 +28,9 @@ class Recorder:
     """Writes the history and the series of one run, follows the crack, and has it guarded.
 
     `memory` is what :meth:`memory` gave for a checkpoint, to go on from there.
+
+    Memory: rows, frames, moments and the crack so far. `loading`, `loading_frame`, `unfailed`, `reached_onset`,
+    `start`, `watch`, `frame` and `finish` add to them, in the order of the run; `memory` gives what a checkpoint needs.
 
     Attributes
     ----------
@@ -48,7 +52,9 @@ class Recorder:
         names = [*(grip.boundary for grip in scene.grips), *(traction.boundary for traction in scene.tractions)]
         held = [sample.nodes(name) for name in dict.fromkeys(names)]
         # a tip in the slowest material has to have moved between two looks at it
-        self.tracker = CrackTracker(space, scene.sink_law.length_scale, momentum.shear_wave_speeds[0], held,
+        self.clock = "sweep" if scene.controls.analysis == "quasistatic" else "s"   #: unit of the time of the event
+        self.tracker = CrackTracker(space, scene.sink_law.length_scale,
+                                    momentum.shear_wave_speeds[0] if self.clock == "s" else None, held,
                                     *rim_of(scene))
         self._cells = {"region": scene.region_numbers} if scene.regions else {}
         if memory is None:
@@ -65,7 +71,7 @@ class Recorder:
         self.moments: dict[str, int] = dict(memory["moments"])
         self.onset: dict[str, Any] = dict(memory["onset"])
         self.at_arrival: dict[str, float] = dict(memory["at_arrival"])
-        self.separated_at = float(memory.get("separated_at", np.inf))   #: first record after the separation [s]
+        self.separated_at = float(memory.get("separated_at", np.inf))   #: first record after the separation [s, or sweep]
         self.series.resume(len(self.frames))  # this may refuse, before any file is touched
         self.loading_series.resume(len(self.loading_frames))
         self.history = History(folder / "history.csv", memory["rows"], space.dim)
@@ -76,6 +82,7 @@ class Recorder:
         self.guard = Guard(scene, momentum)
         self.guard.scale, self.guard.evenness = (self.onset.get(name, 0.0) for name in ("elastic_energy", "evenness"))
         self.guard.dissolved = bool(memory.get("dissolved", False))
+        self.guard.overlaps = list(memory.get("overlaps", []))
         self._waiting = controls.start == "rest"
         self._record_every = 1.0 if quasistatic else controls.record_every
         self._frame_every = 10.0 if quasistatic else controls.frame_every
@@ -83,6 +90,7 @@ class Recorder:
     # --- loading ---
     def loading(self, state: State, reaction: np.ndarray, way: float = 0.0) -> None:
         """Row of a load increment, and a frame where the `way` of the loading (in largest increments) asks for one."""
+        self.guard.check_overlap(state)
         row = self._row(state, reaction, self.tips, 0.0)
         self.history.append(row)
         load = row["reaction_N_per_mm"]
@@ -105,6 +113,7 @@ class Recorder:
             self.loading_frame(state)
         self.loading_frames[-1] = (state.time, "end")
         self.moments = {"end": len(self.loading_frames) - 1}
+        self.guard.check_end()
         self._close(state)
 
     def reached_onset(self, state: State, reaction: np.ndarray) -> None:
@@ -160,16 +169,19 @@ class Recorder:
         """Last row and frame, and the log of deleted elements."""
         self._record(state, reaction, dt)
         self.frame(state, "end")
+        self.guard.check_end()
         self._close(state)
 
     def _close(self, state: State) -> None:
         self.series.flush()
         self.loading_series.flush()
-        log = "".join(f"{time!r},{element}\n" for time, element in state.deletions)
-        write_atomic(self.history.path.with_name("deletions.csv"), "time_s,element\n" + log)
+        log = "".join(f"{int(time) if self.clock == 'sweep' else time!r},{element}\n"
+                      for time, element in state.deletions)
+        write_atomic(self.history.path.with_name("deletions.csv"), ",".join(deletions_header(self.clock)) + "\n" + log)
 
     def frame(self, state: State, label: str) -> None:
         """Add the state to the ParaView series."""
+        self.guard.check_overlap(state)
         if label:
             self.moments[label] = len(self.frames)
         self.frames.append((state.time, label))
@@ -178,12 +190,14 @@ class Recorder:
     def _add(self, series: Series, state: State) -> None:
         momentum, space = self.momentum, self.scene.sample.space
         stress = cauchy_stress(momentum, state.u)
+        crushed = np.isnan(stress).any(axis=1)
+        self.guard.check_stress(state, crushed)
         series.add(
             state.time,
             {"displacement": state.u, "velocity": state.v, "gamma": state.gamma},
             {"deleted": state.deleted.astype(np.int8), "W": space.element_mean(np.minimum(momentum.W, 1e3)),
              "gamma_element": space.element_mean(momentum.gamma), "stress": stress, "pressure": pressure(stress),
-             "von_mises": von_mises(stress), **self._cells})
+             "von_mises": von_mises(stress), "crushed": crushed.astype(np.int8), **self._cells})
 
     def _record(self, state: State, reaction: np.ndarray, dt: float) -> None:
         self.tips = self.tracker.look(state.time, state.gamma)
@@ -216,4 +230,5 @@ class Recorder:
         return {"rows": self.history.rows, "frames": self.frames, "loading_frames": self.loading_frames,
                 "dissolved": self.guard.dissolved, "framed": self._framed, "greatest": self.greatest,
                 "moments": self.moments, "onset": self.onset,
-                "at_arrival": self.at_arrival, "separated_at": self.separated_at}
+                "at_arrival": self.at_arrival, "separated_at": self.separated_at,
+                "overlaps": self.guard.overlaps}

@@ -16,9 +16,9 @@ from scipy.sparse.csgraph import connected_components
 from .loading import Loading
 from .space import Space
 
-__all__ = ["Motion", "free_motions", "moves_as_a_whole"]
+__all__ = ["Motion", "free_motions", "moves_as_a_whole", "pieces"]
 
-RESISTED = 1e-10  # of the stiffest, share of a motion's resistance from which on it is held; rounding is at 1e-16
+RESISTED = 1e-11  # share of the greatest resistance from which on a motion is held; rounding gives 1e-15
 _AXES = "xyz"
 
 
@@ -49,9 +49,9 @@ def pieces(space: Space) -> np.ndarray:
     return np.asarray(label)
 
 
-def free_motions(space: Space, free: np.ndarray) -> Iterator[Motion]:
-    """The rigid motions left to the body, or to its pieces, by the mask `free` (n*dim,) of what is not held."""
-    label = pieces(space)
+def free_motions(space: Space, free: np.ndarray, label: np.ndarray | None = None) -> Iterator[Motion]:
+    """The rigid motions left to the body, or to its :func:`pieces`, by the mask `free` (n*dim,) of what is not held."""
+    label = pieces(space) if label is None else label
     count, held = int(label.max()) + 1, ~free.reshape(space.X.shape)
     size = float(np.ptp(space.X, axis=0).max())
     centre = space.X.mean(axis=0)
@@ -158,9 +158,9 @@ def _named(space: Space, label: np.ndarray, own: np.ndarray, count: int) -> str:
     return f"the piece of {len(elements)} elements around {_place(middle)} mm"
 
 
-def moves_as_a_whole(space: Space, loading: Loading) -> bool:
-    """Whether grips that move only carry every piece along, and strain none, at all load times."""
-    held, label = ~loading.free.reshape(space.X.shape), pieces(space)
+def moves_as_a_whole(space: Space, loading: Loading, label: np.ndarray) -> bool:
+    """Whether grips that move only carry every one of the :func:`pieces` along, and strain none, at all load times."""
+    held = ~loading.free.reshape(space.X.shape)
     members = [np.unique(space.conn[label == k]) for k in range(int(label.max()) + 1)]
     moved = False
     for t in (0.0, *loading.knots):

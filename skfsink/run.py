@@ -6,8 +6,7 @@ import importlib
 import inspect
 import logging
 import shlex
-import tomllib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import fields, replace
 from pathlib import Path
@@ -15,8 +14,10 @@ from typing import Any
 
 from .checkpoint import load_checkpoint, load_state
 from .checks import refuse
-from .corridor import MESH, corridor_report, has_gmsh, lay_corridor
+from .corridor import MESH as CORRIDOR
+from .corridor import corridor_report, has_gmsh, lay_corridor
 from .errors import OutputError, ParameterError
+from .kept_mesh import MESH, keep_mesh, mesh_name, origin
 from .memory import check_memory
 from .models import AUTO, choose_model
 from .occupied import occupied
@@ -28,6 +29,7 @@ from .result import Result, summarize
 from .scene import Scene, read_choice, read_parameters
 from .simulate import Interrupted, Simulation, onset_copy
 from .state import State
+from .text import read_toml
 
 __all__ = ["read_scene", "run_case"]
 
@@ -68,12 +70,13 @@ def run_case(case: Callable[..., Result], make_scene: SceneMaker, own: dict[str,
                 display.say(choice["text"])
             scene = replace(make_scene(own, options), choice=choice)
             check_memory(scene, display)
+            if not resume:
+                refuse(scene)  # before anything is written
             with ExitStack() as locks:
                 places = [folder, *(folder / part for part in PARTS if options.analysis == "both")]
                 there = [place for place in places if place == folder or place.exists()]
                 notes += [locks.enter_context(occupied(place)) for place in there]
                 if not resume:
-                    refuse(scene)
                     _begin(folder, options.overwrite)
                     if options.mesh_layout == "two-pass":
                         options = lay_corridor(scene, own, options, folder, display)
@@ -102,29 +105,34 @@ def read_scene(folder: Path) -> Scene:
     if not path.is_file():
         raise OutputError(f"{folder} holds no run: there is no {path}")
     try:
-        case = str(tomllib.loads(path.read_text(encoding="utf-8"))["case"])
+        case = str(read_toml(path)["case"])
         module = importlib.import_module(f"skfsink.cases.{case}")
         stored = read_parameters(folder, case)
         own = {name: stored.pop(name, p.default)
                for name, p in inspect.signature(getattr(module, case)).parameters.items() if name != "options"}
-        options = replace(Options(), **stored, corridor=_corridor(folder))
-    except (ModuleNotFoundError, UnicodeDecodeError, tomllib.TOMLDecodeError, AttributeError, KeyError,
-            TypeError) as error:
+        options = replace(Options(), **stored, corridor=_corridor(folder), kept=_kept(folder, own))
+    except (ModuleNotFoundError, ValueError, AttributeError, KeyError, TypeError) as error:
         raise OutputError(f"{path} is not the scene of a run: {error}") from None
     scene: Scene = module._scene(own, options)
     return scene
 
 
+def _kept(folder: Path, own: Mapping[str, Any]) -> Path | None:
+    """Mesh that a run has left in its folder, where the parameters do not name it: one that was made by gmsh."""
+    return None if Path(own["mesh"]).suffix or not (folder / MESH).is_file() else folder / MESH
+
+
 def _corridor(folder: Path) -> Path:
     """Mesh of two passes of a run, or of the two runs that it is one of."""
-    above = folder.parent / MESH
-    return above if not (folder / MESH).exists() and above.exists() else folder / MESH
+    above = folder.parent / CORRIDOR
+    return above if not (folder / CORRIDOR).exists() and above.exists() else folder / CORRIDOR
 
 
 def _default_folder(case: str, own: dict[str, Any], options: Options) -> Path:
-    name = f"{Path(own['mesh']).stem}-{options.analysis}"
+    mesh = mesh_name(own["mesh"])
+    name = f"{mesh}-{options.analysis}"
     if options.model:
-        return Path("results") / case / f"{Path(own['mesh']).stem}-{options.model}"
+        return Path("results") / case / f"{mesh}-{options.model}"
     if options.analysis != "quasistatic" and options.integrator != "explicit":
         name += f"-{options.integrator}"
     return Path("results") / case / name
@@ -142,7 +150,8 @@ def _resumed(case: str, own: dict[str, Any], defaults: dict[str, Any],
                              f"a resumed run keeps its scene")
     defaults = {**Options().parameters(), **defaults}
     for name, value in {**own, **options.parameters()}.items():
-        if (name in options.given or value != defaults[name]) and value != stored.get(name):
+        same = value == stored.get(name) or (name == "mesh" and origin(value) == origin(str(stored.get(name))))
+        if (name in options.given or value != defaults[name]) and not same:
             raise ParameterError(f"--{name.replace('_', '-')} {value} is not that of the run in {folder} "
                                  f"({stored.get(name)}); a resumed run keeps its scene")
     known = {f.name for f in fields(Options)} - set(NOT_PHYSICS)
@@ -152,7 +161,7 @@ def _resumed(case: str, own: dict[str, Any], defaults: dict[str, Any],
             raise KeyError(*sorted(unknown))
     except KeyError as error:
         raise OutputError(f"{folder / SCENE} is not the scene of a run: parameter {error}") from None
-    return own, replace(options, **stored, corridor=_corridor(folder)), choice
+    return own, replace(options, **stored, corridor=_corridor(folder), kept=_kept(folder, own)), choice
 
 
 def _begin(folder: Path, overwrite: bool) -> None:
@@ -160,6 +169,13 @@ def _begin(folder: Path, overwrite: bool) -> None:
     prepare_folder(folder, overwrite)
     for name in (SCENE, SUMMARY, Simulation.CHECKPOINT, Simulation.ONSET):
         (folder / name).unlink(missing_ok=True)
+
+
+def _write_scene(scene: Scene, folder: Path) -> None:
+    """Write `scene.toml`, and before it the mesh unless it is one that comes with the program."""
+    if scene.sample.source or scene.sample.made:
+        keep_mesh(scene.sample, folder / MESH)
+    write_atomic(folder / SCENE, scene.toml(MESH))
 
 
 def _run_both(scene: Scene, folder: Path, display: Display, resume: bool,
@@ -174,7 +190,7 @@ def _run_both(scene: Scene, folder: Path, display: Display, resume: bool,
     if not resume:
         for analysis in scenes:
             _begin(folder / analysis, overwrite=True)
-        write_atomic(folder / SCENE, scene.toml())
+        _write_scene(scene, folder)
     parts: dict[str, Result] = {}
     onset: State | None = None
     for analysis, part in scenes.items():
@@ -202,7 +218,7 @@ def _run_one(scene: Scene, folder: Path, display: Display, resume: bool, onset: 
             log.warning(note)
     if not resume:
         simulation.checkpoint()  # from here on the run can be resumed, whenever it is killed
-        write_atomic(folder / SCENE, scene.toml())
+        _write_scene(scene, folder)
     space = scene.sample.space
     for text in scene.sample.notes:
         display.say(f"note: {text}")

@@ -19,6 +19,7 @@ from .errors import CheckpointError, SkfsinkError
 from .explicit import Explicit
 from .guards import Notes
 from .hht import HHT
+from .history import history_units
 from .momentum import Momentum
 from .places import check_arrival, said
 from .progress import Display, Interrupt
@@ -37,6 +38,9 @@ class Interrupted(SkfsinkError):
 
 class Simulation:
     """One run of a scene in a folder, resumable at any moment.
+
+    Memory: the whole run: `run` goes on from where it is; `unfailed`, `dissolved`, `cost` and `checkpoint` are of the
+    run so far.
 
     Parameters
     ----------
@@ -140,7 +144,7 @@ class Simulation:
             started = True
             done = 0.5 * min(1.0, tolerance * state.grip / (loading.increment or np.inf)) ** 0.25
             self.display.update(done, f"grips {self.recorder.gauge.displacement(state):.4f} mm  load "
-                                      f"{self.recorder.load(reaction):.4f} N/mm  least γ {state.gamma.min():.3f}")
+                                      f"{self.recorder.load(reaction):.4f} {self._unit}  least γ {state.gamma.min():.3f}")
             self._pause("loading")
         self._lap("loading")
         if self.unfailed:
@@ -238,8 +242,13 @@ class Simulation:
         size = float((self.scene.sample.space.X.max(axis=0) - self.scene.sample.space.X.min(axis=0)).max())
         load = self.recorder.history.rows[-1]["reaction_N_per_mm"]
         self.display.update(max(fraction, 0.9 * tips.length / size), (
-            f"{clock}  tip {tips.position[0]:.2f}, {tips.position[1]:.2f} mm ×{tips.branches}  load {load:.3f}  "
+            f"{clock}  tip {tips.position[0]:.2f}, {tips.position[1]:.2f} mm ×{tips.branches}  load {load:.3f} {self._unit}  "
             f"elastic {ledger.elastic:.4f} kinetic {ledger.kinetic:.4f} D {ledger.sink:.4f} U {ledger.paper:.4f}"))
+
+    @property
+    def _unit(self) -> str:
+        """Of the load."""
+        return history_units(self.scene.sample.space.dim)["reaction_N_per_mm"]
 
     # --- clocks and checkpoints ---
     def _lap(self, phase: str) -> None:

@@ -20,7 +20,11 @@ __all__ = ["Statics", "StaticsControls"]
 
 
 class Statics(StaticLoading):
-    """Equilibria of a body between grips: loading as of :class:`.StaticLoading`, then a crack through equilibria."""
+    """Equilibria of a body between grips: loading as of :class:`.StaticLoading`, then a crack through equilibria.
+
+    Memory: that of :class:`.StaticLoading`, and whether the last sweep `settled`; `propagate` goes on from there,
+    `memory` gives both.
+    """
 
     SNAP = 400  # Newton steps in a sweep: the body may snap to a shape far away
 

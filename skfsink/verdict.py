@@ -26,7 +26,7 @@ def verdict(scene: Scene, simulation: Simulation) -> str:
     quasistatic = scene.controls.analysis == "quasistatic"
     if not cracked.any():
         why = ("the body is loaded evenly, and no place of it is weaker than another; its result is the greatest load"
-               if even else simulation.statics.arrested or "the state past the onset has not run away yet")
+               if even else simulation.statics.arrested or "what has begun takes a longer event_time to run away")
         when = "past the onset" if quasistatic else f"in the event_time of {event:g} s"
         return f"nothing cracked {when}, least gamma {state.gamma.min():.3g}: {why}"
     if tracker.separated:

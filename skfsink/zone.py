@@ -46,6 +46,8 @@ class ActiveZone:
 
     Zones are handed in and out: which ones a solve finds is the caller's affair, and no solve depends on another.
 
+    Memory: counts and the `residual` of the last solve. `solve` depends on no earlier call.
+
     Parameters
     ----------
     X: nodal coordinates [mm], (n, dim).

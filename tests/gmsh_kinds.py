@@ -34,7 +34,7 @@ KINDS: dict[str, dict[str, Any]] = {
 
 
 @contextmanager
-def _model(options: dict[str, float]) -> Iterator[Any]:
+def model(options: dict[str, float]) -> Iterator[Any]:
     import gmsh
 
     gmsh.initialize(readConfigFiles=False, interruptible=False)
@@ -54,7 +54,7 @@ def make(path: Path, dim: int, form: str = "41", *, options: dict[str, float] | 
     Groups: `soft` and `lid` are the two halves, `whole` both; `the bottom` (y = 0) and `lid` (y = 2) sides; `seam`
     between the halves; `corner` at the origin; in space also the curve `edge` through the origin along z.
     """
-    with _model({**FORMS[form], **(options or {})}) as gmsh:
+    with model({**FORMS[form], **(options or {})}) as gmsh:
         occ, mesh = gmsh.model.occ, gmsh.model.mesh
         halves = [(2, occ.addRectangle(x, 0, height, 2, 2)) for x in (0, 2)]
         occ.fragment(halves[:1], halves[1:])

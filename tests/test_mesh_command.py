@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -229,8 +230,12 @@ def test_sets_of_nodes_in_space() -> None:
     mesh.point_sets = {"floor nodes": np.flatnonzero(X[:, 2] == 0), "all": np.arange(len(X)),
                        "outside": np.flatnonzero(((X == 0) | (X == 1)).any(axis=1)),
                        "curve": np.flatnonzero((X[:, 2] == 0) & (X[:, 0] == 0)), "half": np.flatnonzero(X[:, 2] < 0.7)}
+    lone = np.flatnonzero((X == [1, 1, 0.5]).all(axis=1))
+    mesh.point_sets["spot"] = np.append(np.flatnonzero((X[:, 2] == 0) & (X[:, 1] <= 0.5)), lone)
     made = mesh_sample("sets", split(mesh))
     Y = made.space.X
+    slope = (Y == [1, 0.75, 0.25]).all(axis=1)  # the middle of an edge from the spot to the lone node
+    assert slope.any() and not slope[made.nodes("spot")].any() and (Y[made.nodes("spot")][:, 2] == 0).sum() == 19
     assert np.array_equal(made.nodes("floor nodes"), made.nodes("floor"))
     facets = made.space.mesh.facets[:, made.space.mesh.boundary_facets()]
     assert np.array_equal(made.nodes("outside"), np.unique(facets))
@@ -255,8 +260,12 @@ def test_middle_nodes_are_the_middles_of_edges() -> None:
     points = np.vstack([mesh.points, middle])
     held = np.array([number[tuple(sorted(line))] for line in lines[mesh.cell_sets["top"][-1]].tolist()])
     ends = lines[mesh.cell_sets["top"][-1]].ravel()
-    new = split(meshio.Mesh(points, [("triangle6", np.array(rows)), ("line", lines)],
-                            cell_sets=mesh.cell_sets, point_sets={"held": np.append(held, ends), "ends": ends}))
+    sets = {name: [*members, np.zeros(0, int)] for name, members in mesh.cell_sets.items()}
+    sets["spot"] = [np.zeros(0, int), np.zeros(0, int), np.array([0])]
+    new = split(meshio.Mesh(points, [("triangle6", np.array(rows)), ("line", lines), ("vertex", held[:1, None])],
+                            cell_sets=sets, point_sets={"held": np.append(held, ends), "ends": ends}))
+    (spot,) = new.points[new.cells[2].data[0]]
+    assert spot[1] == 2.03
     sample = mesh_sample("curved", new)
     X = sample.space.X
     on = X[sample.nodes("top")]
@@ -268,12 +277,16 @@ def test_middle_nodes_are_the_middles_of_edges() -> None:
     assert any("1 middle node(s) were not near the middle" in note for note in sample.notes)
 
 
-def test_second_order_in_space() -> None:
+@pytest.mark.parametrize("name", ["tetrahedra", "wedges and hexahedra"])
+def test_second_order_in_space(name: str) -> None:
     """Fails if straight elements of second order are split otherwise than those of first order, or a set of nodes of
     one side gains nodes inside."""
-    mesh = tetrahedra()
+    mesh = MESHES[name]()
     mesh.point_sets["outside"] = np.flatnonzero(((mesh.points == 0) | (mesh.points == 1)).any(axis=1))
-    pairs = {"tetra": [(0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)], "triangle": [(0, 1), (1, 2), (2, 0)]}
+    pairs = {"tetra": [(0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)],
+             "wedge": [(0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5)],
+             "hexahedron": [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6),
+                            (3, 7)], "triangle": [(0, 1), (1, 2), (2, 0)], "quad": [(0, 1), (1, 2), (2, 3), (3, 0)]}
     number: dict[tuple[int, ...], int] = {}
     blocks = []
     for block in mesh.cells:
@@ -286,6 +299,7 @@ def test_second_order_in_space() -> None:
     second = mesh_sample("second", split(meshio.Mesh(points, blocks, cell_sets=mesh.cell_sets, point_sets=sets)))
     first = mesh_sample("first", split(mesh))
     assert second.space.V.sum() == pytest.approx(1, rel=1e-13)
+    assert second.notes[0] == f"{len(number)} middle node(s) of elements of second order are corners now"
     for boundary in ("floor", "wall", "held", "outside"):
         assert sorted(map(tuple, np.round(second.space.X[second.nodes(boundary)], 9))) == sorted(
             map(tuple, np.round(first.space.X[first.nodes(boundary)], 9)))
@@ -410,6 +424,69 @@ def test_solids_keep_their_faces(tmp_path: Path) -> None:
     assert (sample.space.X[sample.nodes("lid")][:, 2] == 1).all()
 
 
+@pytest.mark.parametrize("name", MESHES)
+def test_collapsed_elements(name: str, tmp_path: Path) -> None:
+    """Fails if a triangle written as a quadrilateral, or a wedge or tetrahedron as a hexahedron, is refused, or leaves
+    its sets."""
+    mesh = MESHES[name]()
+    spread = {"triangle": [0, 1, 2, 2], "tetra": [0, 1, 2, 2, 3, 3, 3, 3], "wedge": [0, 1, 2, 2, 3, 4, 5, 5],
+              "quad": [0, 1, 2, 3], "hexahedron": list(range(8))}
+    for i, block in enumerate(mesh.cells):
+        if block.type != "line":
+            turn = np.roll(np.arange(4), i)  # begin at any corner
+            cells = block.data[:, spread[block.type]]
+            mesh.cells[i] = meshio.CellBlock("quad" if block.dim == 2 else "hexahedron",
+                                             cells[:, turn if block.dim == 2 else [*turn, *(turn + 4)]])
+    write_mesh(tmp_path / "in.vtu", mesh)
+    with pytest.raises(MeshError, match="it has a node twice; if that is how"):
+        file_sample(tmp_path / "in.vtu")
+    sample, wanted = mesh_sample("in", converted(tmp_path / "in.vtu")), mesh_sample("split", split(MESHES[name]()))
+    assert sample.space.V.sum() == pytest.approx(wanted.space.V.sum(), rel=1e-13)
+    assert sample.space.n_elements == wanted.space.n_elements and sample.space.n_nodes == wanted.space.n_nodes
+    for boundary in wanted.boundaries:
+        assert len(sample.nodes(boundary)) == len(wanted.nodes(boundary)) > 2, boundary
+    for region in wanted.cells:
+        assert len(sample.elements(region)) == len(wanted.elements(region))
+        assert sample.space.V[sample.elements(region)].sum() == pytest.approx(
+            wanted.space.V[wanted.elements(region)].sum(), rel=1e-12)
+
+
+def test_elements_that_are_pinched(tmp_path: Path) -> None:
+    """Fails if an element that is no other one is taken for one."""
+    square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
+    meshio.write(tmp_path / "a.vtk", meshio.Mesh(square, [("quad", np.array([[0, 1, 0, 2], [0, 1, 2, 3]]))]))
+    with pytest.raises(MeshError, match="has a node twice"):
+        converted(tmp_path / "a.vtk")
+
+
+def test_planes_inside_are_no_boundaries(tmp_path: Path) -> None:
+    """Fails if a plane between elements becomes a boundary, whose grip would hold the middle of the body."""
+    x, y = np.meshgrid([0, 0.5, 1], [0, 0.5, 1.0])
+    quads = np.array([[0, 1, 4, 3], [1, 2, 5, 4], [3, 4, 7, 6], [4, 5, 8, 7]])
+    meshio.write(tmp_path / "grid.vtk", meshio.Mesh(np.column_stack([x.ravel(), y.ravel(), 0 * x.ravel()]),
+                                                    [("quad", quads)]))
+    with pytest.raises(MeshError, match=r"boundary mid: no edge on the outside lies in x = 0\.5 mm"):
+        converted(tmp_path / "grid.vtk", boundaries=["mid=x:0.5"])
+
+
+def test_triangles_beside_hexahedra(tmp_path: Path) -> None:
+    """Fails if triangles that are no faces of the body are run over in silence, or stop the conversion."""
+    cells = [("hexahedron", np.array([[0, 1, 3, 2, 4, 5, 7, 6]])), ("triangle", np.array([[0, 1, 2]]))]
+    write_mesh(tmp_path / "cube.vtu", meshio.Mesh(CUBE.astype(float), cells))
+    with pytest.raises(MeshError, match="has triangle cells beside its elements"):
+        file_sample(tmp_path / "cube.vtu")
+    assert "1 cell(s) (triangle)" in mesh_sample("cube", converted(tmp_path / "cube.vtu")).notes[0]
+
+
+def test_a_boundary_of_edges_and_nodes(tmp_path: Path) -> None:
+    """Fails if the nodes of a set are lost beside the edges of the same name."""
+    mesh = plate(5)
+    far = int(np.flatnonzero(mesh.points[:, 1] == 0)[0])
+    mesh.point_sets = {"top": np.array([far])}
+    write_mesh(tmp_path / "plate.vtu", mesh)
+    assert len(file_sample(tmp_path / "plate.vtu").nodes("top")) == 7
+
+
 def test_second_order_without_a_split(tmp_path: Path) -> None:
     """Fails if quadrilaterals of second order are split, or keep their middle nodes."""
     corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
@@ -447,6 +524,31 @@ def test_what_the_command_refuses(arguments: list[str], said: str, tmp_path: Pat
     status, err, _ = invoke_program("mesh", *arguments)
     assert status == 2 and said.lower() in err.lower() and len(err.splitlines()) == 1, err
     assert contents(tmp_path) == before
+
+
+@pytest.mark.parametrize(("value", "said"), [(np.nan, "not finite"), (1e200, "within 1e+09 mm of the origin")])
+def test_coordinates_that_cannot_be(value: float, said: str, tmp_path: Path) -> None:
+    """Fails if a body without a size is split, or the numbers overflow on the way."""
+    mesh = triangles()
+    mesh.points[7, 1] = value
+    write_mesh(tmp_path / "in.vtu", mesh)
+    with pytest.raises(MeshError) as error:
+        converted(tmp_path / "in.vtu", merge_nodes=1e-6)
+    assert said in str(error.value)
+
+
+def test_the_page_of_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fails if the page shows what the command does not print."""
+    monkeypatch.chdir(tmp_path)
+    page = (Path(__file__).resolve().parents[1] / "docs" / "mesh_command.md").read_text(encoding="utf-8")
+    found = {kind: re.findall(rf"^```{kind}\n(.*?)^```", page, re.DOTALL | re.MULTILINE)
+             for kind in ("python", "bash", "text")}
+    exec(compile(found["python"][0], "page", "exec"), {})
+    with pytest.raises(MeshError, match=r"convert it with skfsink mesh strips\.vtk OUT"):
+        file_sample(Path("strips.vtk"))
+    status, err, out = invoke_program(*found["bash"][0].replace("\\\n", "").split()[1:])
+    assert (status, err, out) == (0, "", found["text"][0])
+    assert len(file_sample(Path("strip.vtu")).nodes("top")) == 21
 
 
 def test_overwriting(tmp_path: Path) -> None:

@@ -56,6 +56,8 @@ def test_scene_file_is_enough_to_run_again(arguments: list[str], mesh: Path, tmp
     assert parameters.keys() == OWN.keys() | Options().parameters().keys()
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path / "elsewhere")
+    assert parameters["mesh"] == "mesh.npz"  # beside it
+    parameters["mesh"] = str(tmp_path / "first" / "mesh.npz")
     options = {name: value for name, value in parameters.items() if name not in OWN}
     result = single_edge_notch(**{name: parameters[name] for name in OWN},
                                options=Options(**options, out=Path("second"), quiet=True))

@@ -1,1 +1,1 @@
-"""Readers of mesh files, one module a format; :func:`.mesh_file.read_mesh_file` is the entrance."""
+"""Reading, mending and converting of mesh files."""

@@ -10,8 +10,9 @@ import meshio
 import numpy as np
 
 from ..errors import MeshError, ParameterError
-from ..mesh_file import check_mesh, one_line, read_mesh_file
+from ..mesh_file import EXTENT, check_mesh, one_line, read_mesh_file
 from ..units import in_unit
+from .collapsed import uncollapsed
 from .orientation import FACETS, oriented
 from .pieces import merged, shortest
 from .split import drop_others, needs_split, split
@@ -52,6 +53,9 @@ def converted(path: Path, unit: str = "mm", merge_nodes: float = 0.0, boundaries
     without_orphans(mesh)
     if not np.isfinite(mesh.points).all():
         raise MeshError(f"mesh {name}: the mesh has a node whose coordinates are not finite numbers")
+    if (far := float(np.abs(mesh.points).max())) > EXTENT[1]:
+        raise MeshError(f"mesh {name} must lie within {EXTENT[1]:g} mm of the origin; it reaches {far:g} mm")
+    uncollapsed(mesh)
     merged(name, mesh, merge_nodes)
     if needs_split(mesh):
         try:

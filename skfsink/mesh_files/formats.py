@@ -44,60 +44,48 @@ def read_format(path: Path) -> meshio.Mesh:
     Unreadable, SkfsinkError
         What is wrong with the file, and what to do, in one line.
     """
-    suffix = path.suffix.lower()
-    if suffix in CURES:
-        raise Unreadable(f"files {suffix} are not read; {CURES[suffix]}")
-    if suffix not in READERS:
-        raise Unreadable(f"{f'files {suffix[:20]}' if suffix else 'files without a suffix'} are not read; what is: "
-                         f"{', '.join(READERS)}; save it as one of these")
-    name, reader = READERS[suffix]
+    name, reader = _reader(path)
     try:
         mesh = reader(path)
-    except (Unreadable, SkfsinkError, MemoryError):
+    except (Unreadable, SkfsinkError):
         raise
+    except MemoryError:
+        raise Unreadable("it needs more memory than a mesh file of its size should") from None
     except Exception as error:
         raise Unreadable(f"it is damaged, or not of the format {name}") from error
     mesh.info = {"notes": [], **(mesh.info or {})}
     return mesh
 
 
-def _msh(path: Path) -> meshio.Mesh:
+def _reader(path: Path) -> tuple[str, Callable[[Path], meshio.Mesh]]:
+    """Name and reader of the format of a file."""
+    suffix = path.suffix.lower()
+    if suffix in CURES:
+        raise Unreadable(f"files {suffix} are not read; {CURES[suffix]}")
+    if suffix not in READERS:
+        raise Unreadable(f"{f'files {suffix[:20]}' if suffix else 'files without a suffix'} are not read; what is: "
+                         f"{', '.join(READERS)}; save it as one of these")
     with path.open("rb") as file:
-        if file.read(1) == b"(":
-            raise Unreadable("it is a mesh of Fluent, whose cells are given by their faces; open it in ParaView "
-                             "and save it as VTU")
-    return read_gmsh(path)
+        begin = file.read(10**5)
+    if suffix == ".msh" and begin.lstrip().startswith(b"("):
+        raise Unreadable("it is a mesh of Fluent, whose cells are given by their faces; open it in ParaView and save "
+                         "it as VTU")
+    if suffix == ".vtk" and begin.lstrip().startswith(b"<"):
+        suffix = ".vtu"
+    if suffix == ".inp" and is_ucd(begin):
+        suffix = ".ucd"
+    return READERS[suffix]
 
 
-def _vtu(path: Path) -> meshio.Mesh:
-    return named_sets(read_vtu(path))
-
-
-def _vtk(path: Path) -> meshio.Mesh:
-    with path.open("rb") as file:
-        if file.read(100).lstrip().startswith(b"<"):
-            return _vtu(path)
-    return named_sets(read_vtk(path))
-
-
-def _inp(path: Path) -> meshio.Mesh:
-    with path.open("rb") as file:
-        if is_ucd(file.read(10**5)):
-            return _ucd(path)
-    return read_abaqus(path)
-
-
-def _ucd(path: Path) -> meshio.Mesh:
-    return named_sets(read_ucd(path))
-
-
-def _nastran(path: Path) -> meshio.Mesh:
-    return named_sets(read_nastran(path))
+def _with_sets(reader: Callable[[Path], meshio.Mesh]) -> Callable[[Path], meshio.Mesh]:
+    """A reader that gives a mesh the sets that its arrays of whole numbers stand for."""
+    return lambda path: named_sets(reader(path))
 
 
 READERS: dict[str, tuple[str, Callable[[Path], meshio.Mesh]]] = {
-    ".msh": ("MSH", _msh), ".vtu": ("VTU", _vtu), ".vtk": ("VTK", _vtk), ".inp": ("Abaqus", _inp),
-    **dict.fromkeys((".avs", ".ucd"), ("UCD", _ucd)),
-    **dict.fromkeys((".bdf", ".nas", ".fem", ".nastran"), ("Nastran", _nastran)),
+    ".msh": ("MSH", read_gmsh), ".vtu": ("VTU", _with_sets(read_vtu)), ".vtk": ("VTK", _with_sets(read_vtk)),
+    ".inp": ("Abaqus", read_abaqus),
+    **dict.fromkeys((".avs", ".ucd"), ("UCD", _with_sets(read_ucd))),
+    **dict.fromkeys((".bdf", ".nas", ".fem", ".nastran"), ("Nastran", _with_sets(read_nastran))),
     **dict.fromkeys((".e", ".exo", ".ex2", ".exii"), ("Exodus", read_exodus)),
 }

@@ -12,7 +12,9 @@ from pathlib import Path
 import meshio
 import numpy as np
 
-from .msh import DIMENSION, NODES, SHAPE, Block, Msh, read_msh
+from .msh import Msh, read_msh
+from .msh_block import DIMENSION, NODES, SHAPE, Block
+from .numbers import places
 from .sets import join_boundaries
 from .unreadable import Unreadable
 
@@ -69,10 +71,6 @@ def read_gmsh(path: Path) -> meshio.Mesh:
 
 def _by_kind(msh: Msh, notes: list[str]) -> list[Block]:
     """One block a kind, in the order of the file, with nodes by their place in `msh.points`."""
-    order = np.argsort(msh.tags, kind="stable")
-    tags = msh.tags[order]
-    if (tags[1:] == tags[:-1]).any():
-        raise Unreadable(f"it has the node {tags[1:][tags[1:] == tags[:-1]][0]} twice")
     kinds: dict[int, list[Block]] = {}
     reduced = 0
     for block in msh.blocks:
@@ -80,13 +78,13 @@ def _by_kind(msh: Msh, notes: list[str]) -> list[Block]:
         if kind not in NAMES:
             kind = next(k for k in NAMES if SHAPE[k] == SHAPE[block.kind])
             nodes, reduced = nodes[:, :NODES[kind]], reduced + len(nodes)
-        place = np.searchsorted(tags, nodes)
-        if nodes.size and (not len(tags) or (tags[np.minimum(place, len(tags) - 1)] != nodes).any()):
-            raise Unreadable("it has elements with nodes that do not exist")
-        kinds.setdefault(kind, []).append(Block(kind, order[place], block.groups, block.entities))
+        kinds.setdefault(kind, []).append(Block(kind, nodes, block.groups, block.entities))
     if reduced:
         notes.append(f"{reduced} elements of order 3 or more are taken by their corners")
-    return [_joined(blocks) for blocks in kinds.values()]
+    joined = [_joined(blocks) for blocks in kinds.values()]
+    for block in joined:
+        block.nodes = places(msh.tags, block.nodes)
+    return joined
 
 
 def _joined(blocks: list[Block]) -> Block:

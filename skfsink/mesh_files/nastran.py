@@ -15,13 +15,14 @@ from pathlib import Path
 import meshio
 import numpy as np
 
+from .numbers import places
 from .unreadable import Unreadable
 
 __all__ = ["read_nastran"]
 
 CELLS: dict[str, tuple[tuple[str, int], ...]] = {
-    **dict.fromkeys(("CQUAD4", "CQUADR", "CSHEAR", "CQUADX4", "CPLSTN4", "CPLSTS4"), (("quad", 4),)),
-    **dict.fromkeys(("CQUAD8", "CQUADX8", "CPLSTN8", "CPLSTS8"), (("quad", 4), ("quad8", 8))),
+    **dict.fromkeys(("CQUAD4", "CQUADR", "CPLSTN4", "CPLSTS4"), (("quad", 4),)),
+    **dict.fromkeys(("CQUAD8", "CPLSTN8", "CPLSTS8"), (("quad", 4), ("quad8", 8))),
     "CQUAD": (("quad", 4), ("quad8", 8), ("quad9", 9)),
     "CHEXA": (("hexahedron", 8), ("hexahedron20", 20)),
     **dict.fromkeys(("CTRIA3", "CTRIAR", "CPLSTN3", "CPLSTS3"), (("triangle", 3),)),
@@ -34,7 +35,8 @@ NUMBER = {card: max(n for _, n in kinds) for card, kinds in CELLS.items()}
 #: middle nodes of the sides of a hexahedron come before those of its top; VTK has them last
 ORDER = {"hexahedron20": [*range(12), 16, 17, 18, 19, 12, 13, 14, 15],
          "wedge15": [*range(9), 12, 13, 14, 9, 10, 11], "pyramid13": [*range(13)]}
-PLAIN = ("CORD", "CHACAB", "CSET", "CYJOIN", "CBARAO")  # cards that begin like elements and are none
+PLAIN = ("CORD", "CSET", "CYJOIN", "CBARAO", "CEND", "RESVEC")  # cards that begin like elements and are none
+ROUND = ("CQUADX", "CTRIAX", "CTRAX")  # elements of bodies of revolution
 
 
 def read_nastran(path: Path) -> meshio.Mesh:
@@ -67,6 +69,9 @@ def read_nastran(path: Path) -> meshio.Mesh:
                     held.setdefault(f"spc:{int(fields[0])}", []).append(node)
             elif card.startswith("INCLUDE"):
                 raise Unreadable(f"line {number}: it names another file; put all into one")
+            elif card.startswith(ROUND):
+                raise Unreadable(f"line {number}: it has elements {card} of a body of revolution, which cannot be "
+                                 "computed; mesh the body in space, or as a plane one")
             elif card[0] in "CR" and not card.startswith(PLAIN):
                 left_out[card] += 1
         except Unreadable:
@@ -74,27 +79,16 @@ def read_nastran(path: Path) -> meshio.Mesh:
         except (ValueError, IndexError):
             raise Unreadable(f"line {number}: the card {card[:16]} is not complete or has something that is no "
                              "number") from None
-    tags = np.array(sorted(points), np.int64)
-    if not len(tags):
+    if not points:
         raise Unreadable("it has no grid points")
-    order = np.array(list(points), np.int64)  # nodes stay in the order of the file
-    index = np.argsort(order)
-
-    def found(nodes: list[list[int]] | list[int]) -> np.ndarray:
-        asked = np.array(nodes, np.int64)
-        place = np.minimum(np.searchsorted(tags, asked), len(tags) - 1)
-        if (tags[place] != asked).any():
-            raise Unreadable("it has elements with nodes that do not exist")
-        at: np.ndarray = index[place]
-        return at
-
+    tags = np.array(list(points), np.int64)
     notes = [f"{n} card(s) {card} were left out" for card, n in sorted(left_out.items())]
-    there = {name: [node for node in nodes if node in points] for name, nodes in held.items()}
+    there = {name: np.array([node for node in nodes if node in points], np.int64) for name, nodes in held.items()}
     return meshio.Mesh(np.array(list(points.values())),
-                       [(name, found([nodes for nodes, _ in rows])[:, ORDER.get(name, slice(None))])
-                        for name, rows in cells.items()],
+                       [(name, places(tags, np.array([nodes for nodes, _ in rows], np.int64))
+                         [:, ORDER.get(name, slice(None))]) for name, rows in cells.items()],
                        cell_data={"property": [np.array([group for _, group in rows]) for rows in cells.values()]},
-                       point_sets={name: np.unique(found(nodes)) for name, nodes in there.items() if nodes},
+                       point_sets={name: np.unique(places(tags, nodes)) for name, nodes in there.items() if len(nodes)},
                        info={"notes": notes})
 
 
@@ -128,8 +122,10 @@ def _held(card: str, fields: list[str]) -> list[int]:
 
 def _real(field: str) -> float:
     """A number, in which the `E` of the exponent may be left out or be a `D`; 0 if there is none."""
-    if not field:
-        return 0.0
+    try:
+        return float(field or 0)
+    except ValueError:
+        pass
     return float(re.sub(r"(?<=[\d.])([+-]\d+)$", r"E\1", field.upper().replace("D", "E")))
 
 
@@ -139,9 +135,9 @@ def _cards(lines: list[str]) -> Iterator[tuple[int, str, list[str]]]:
     number, name, fields = 0, "", list[str]()
     for at, line in enumerate(lines[begin:], begin + 1):
         line = line.partition("$")[0].rstrip()
-        if not line.strip():
+        if not line:
             continue
-        if re.match(r"ENDDATA\b", line, re.I):
+        if line[:7].upper() == "ENDDATA":
             break
         first, own = _fields(line)
         if first in ("", "+", "*") or first[0] in "+*":
@@ -149,7 +145,7 @@ def _cards(lines: list[str]) -> Iterator[tuple[int, str, list[str]]]:
             continue
         if name:
             yield number, name, fields
-        number, name, fields = at, first.rstrip("*").upper(), own
+        number, name, fields = at, first.rstrip("*").strip().upper(), own
     if name:
         yield number, name, fields
 
@@ -160,7 +156,8 @@ def _fields(line: str) -> tuple[str, list[str]]:
         words = [word.strip() for word in line.split(",")]
         n = 4 if words[0].endswith("*") or words[0].startswith("*") else 8
         return words[0], [*words[1:1 + n], *[""] * (n + 1 - len(words))]
-    line = line.expandtabs(8)
+    line = line.expandtabs(8) if "\t" in line else line
     first = line[:8].strip()
     width, n = (16, 4) if "*" in first else (8, 8)
-    return first, [line[8 + i * width:8 + (i + 1) * width].strip() for i in range(n)]
+    found = [line[i:i + width].strip() for i in range(8, min(len(line), 8 + n * width), width)]
+    return first, found + [""] * (n - len(found))

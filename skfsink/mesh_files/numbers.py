@@ -8,7 +8,26 @@ import numpy as np
 
 from .unreadable import Unreadable
 
-__all__ = ["Binary", "Text", "whole"]
+__all__ = ["Binary", "Text", "places", "whole"]
+
+
+def places(tags: np.ndarray, asked: np.ndarray) -> np.ndarray:
+    """Where the numbers `asked` are in `tags` (n,), each of which is there once.
+
+    Raises
+    ------
+    Unreadable
+        One of `tags` is there twice, or one that is asked for is not there.
+    """
+    order = np.argsort(tags, kind="stable")
+    known = tags[order]
+    if (twice := known[1:][known[1:] == known[:-1]]).size:
+        raise Unreadable(f"it has the node {twice[0]} twice")
+    place = np.searchsorted(known, asked)
+    if asked.size and (not len(known) or (known[np.minimum(place, len(known) - 1)] != asked).any()):
+        raise Unreadable("it has elements with nodes that do not exist")
+    found: np.ndarray = order[place]
+    return found
 
 
 def whole(values: np.ndarray) -> np.ndarray:
@@ -29,6 +48,9 @@ def whole(values: np.ndarray) -> np.ndarray:
 
 class Text:
     """Numbers in text, parted by blanks and ends of lines.
+
+    Memory: the place in the data: `take`, `reals`, `ints`, `records`, `left`, `ahead` and `end` go on from where the
+    last call ended.
 
     Parameters
     ----------
@@ -93,6 +115,9 @@ class Text:
 
 class Binary:
     """Numbers in bytes.
+
+    Memory: the place in the data: `take`, `reals`, `ints`, `sizes`, `records` and `end` go on from where the last call
+    ended.
 
     Parameters
     ----------

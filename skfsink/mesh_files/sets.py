@@ -2,12 +2,13 @@
 
 An array `boundary:NAME` marks the set NAME with values other than 0. Any other array of whole numbers `NAME` gives a
 set `NAME:1`, `NAME:2`, ... for each of its values; if these are 0 and 1 only, it also is the set NAME. On elements
-these are regions; on edges, faces, vertices and points they are boundaries.
+these are regions; on edges, faces, vertices and points they are boundaries. Arrays that number all elements or points
+are left out.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import meshio
 import numpy as np
@@ -17,7 +18,8 @@ from .unreadable import Unreadable
 __all__ = ["BOUNDARY_PREFIX", "join_boundaries", "named_sets"]
 
 BOUNDARY_PREFIX = "boundary:"
-MOST = 1000  # values of an array that numbers regions; one that has more, or as many as entries, numbers what it is on
+MOST = 1000  # values of an array that numbers regions
+FEW = 32     # an array of more values than this that are all different numbers elements or points, not regions
 DIMENSION = {"vertex": 0, "line": 1, "line3": 1, "triangle": 2, "triangle6": 2, "quad": 2, "quad8": 2, "quad9": 2}
 
 
@@ -40,8 +42,7 @@ def named_sets(mesh: meshio.Mesh) -> meshio.Mesh:
         if any(len(part) != len(block.data) for part, block in zip(values, mesh.cells, strict=True)):
             raise Unreadable(f"its data {key} are not as many as its cells")
         own = key.startswith(BOUNDARY_PREFIX)
-        joined = np.concatenate([np.asarray(part).reshape(len(part), -1) for part in values]) if values else np.zeros(0)
-        for name, mask in _masks(key, joined):
+        for name, mask in _masks(key, values):
             members = [np.flatnonzero(part) for part in np.split(mask, starts)]
             lower = [block.data[index].ravel() for block, dim, index in zip(mesh.cells, dims, members)
                      if dim < body - 1 and len(index)]
@@ -54,20 +55,24 @@ def named_sets(mesh: meshio.Mesh) -> meshio.Mesh:
                 mesh.cell_sets.setdefault(name, members)
         if own:
             del mesh.cell_data[key]
-    for key, values in mesh.point_data.items():
+    for key, values in list(mesh.point_data.items()):
         if len(values) != len(mesh.points):
             raise Unreadable(f"its data {key} are not as many as its points")
-        for name, mask in _masks(key, np.asarray(values).reshape(len(values), -1)):
-            if key.startswith(BOUNDARY_PREFIX) or (name not in nodes and name not in facets):
+        own = key.startswith(BOUNDARY_PREFIX)
+        for name, mask in _masks(key, [values]):
+            if own or (name not in nodes and name not in facets):
                 nodes.setdefault(name, []).append(np.flatnonzero(mask))
+        if own:
+            del mesh.point_data[key]
     for name, parts in nodes.items():
         mesh.point_sets.setdefault(name, np.unique(np.concatenate(parts)).astype(np.int64))
     return join_boundaries(mesh)
 
 
-def _masks(key: str, values: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
-    """Names of the sets of an array (n, components), and who is in each."""
-    if values.ndim != 2 or values.shape[1] != 1 or values.dtype.kind not in "iufb":
+def _masks(key: str, parts: Sequence[np.ndarray]) -> Iterator[tuple[str, np.ndarray]]:
+    """Names of the sets of an array, which is given by blocks of cells, and who is in each."""
+    values = np.concatenate([np.asarray(part).reshape(len(part), -1) for part in parts]) if parts else np.zeros((0, 1))
+    if values.shape[1] != 1 or values.dtype.kind not in "iufb":
         return
     values = values[:, 0]
     if key.startswith(BOUNDARY_PREFIX):
@@ -78,11 +83,11 @@ def _masks(key: str, values: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
                                          and np.abs(values).max() < 2**53):
         return  # a field
     found = np.unique(values)
-    if len(found) > min(MOST, max(1, len(values) - 1)):
+    if len(found) > MOST or any(FEW < len(part) == len(np.unique(part)) for part in parts):
         return
     for value in found.tolist():
         yield f"{key}:{int(value)}", values == value
-    if found.tolist() in ([0, 1], [1]):
+    if found.tolist() == [0, 1]:
         yield key, values == 1
 
 

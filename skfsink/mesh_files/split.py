@@ -31,7 +31,7 @@ FACES = {
     "wedge": ((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
     "hexahedron": ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))}
 #: cells of second order: the nodes in the middle of their edges follow those at the corners, in the order of EDGES
-SECOND = ("line3", "triangle6", "quad8", "quad9", "tetra10", "wedge18", "hexahedron20", "hexahedron27")
+SECOND = ("line3", "triangle6", "quad8", "quad9", "tetra10", "wedge15", "wedge18", "hexahedron20", "hexahedron27")
 OFF = 0.2  # a middle node further from the middle of its edge than this, over the edge, is not taken for it
 
 
@@ -290,7 +290,7 @@ def _sets_of_nodes(mesh: meshio.Mesh, body: list[int], dim: int, edges: np.ndarr
             whole &= outer_edge
         given = np.isin(middle, nodes) & (middle >= 0)
         parts.append(n + np.flatnonzero(np.where(middle >= 0, given, whole)))
-        sets[name] = np.setdiff1d(np.unique(np.concatenate(parts)), middle[middle >= 0])
+        sets[name] = np.unique(np.concatenate(parts))  # those that are middle nodes go with them
     return sets
 
 

@@ -13,6 +13,7 @@ from pathlib import Path
 import meshio
 import numpy as np
 
+from .numbers import Text, places, whole
 from .unreadable import Unreadable
 
 __all__ = ["is_ucd", "read_ucd"]
@@ -42,44 +43,48 @@ def read_ucd(path: Path) -> meshio.Mesh:
     text = path.read_bytes()
     if not is_ucd(text[:10**5]):
         raise Unreadable("its first line is not that of a UCD file in text: numbers of nodes, cells and data")
-    lines = [line.split() for line in text.decode(errors="replace").splitlines()
-             if line.strip() and not line.lstrip().startswith("#")]
+    lines = [line.split() for line in text.splitlines() if line.strip() and not line.lstrip().startswith(b"#")]
     n_nodes, n_cells, n_point_data, n_cell_data, _ = (int(word) for word in lines[0])
     if len(lines) < 1 + n_nodes + n_cells:
         raise Unreadable(f"it has fewer lines than the {n_nodes} nodes and {n_cells} cells that it says")
     nodes, cells, rest = lines[1:1 + n_nodes], lines[1 + n_nodes:1 + n_nodes + n_cells], lines[1 + n_nodes + n_cells:]
-    place = {int(words[0]): i for i, words in enumerate(nodes)}
-    if len(place) < n_nodes:
-        raise Unreadable("it has a node twice")
-    points = np.array([[float(x) for x in words[1:4]] for words in nodes]).reshape(-1, 3)
-    blocks: dict[str, list[int]] = {}
+    rows = _numbers(nodes, 0, 4, "nodes")
+    kinds: dict[str, list[int]] = {}
     for i, words in enumerate(cells):
-        if words[2].lower() not in KINDS or len(words) != 3 + len(KINDS[words[2].lower()][1]):
-            raise Unreadable(f"it has a cell {' '.join(words[:3])[:40]!r} of a kind or number of nodes that is unknown")
-        blocks.setdefault(words[2].lower(), []).append(i)
+        kinds.setdefault(words[2].decode(errors="replace").lower(), []).append(i)
+    blocks = []
+    for kind, index in kinds.items():
+        if kind not in KINDS:
+            raise Unreadable(f"it has cells {kind[:20]!r}, which cannot be read")
+        name, order = KINDS[kind]
+        asked = _numbers([cells[i] for i in index], 3, 3 + len(order), f"cells {kind}")
+        blocks.append((name, places(whole(rows[:, 0]), whole(asked))[:, order]))
     point_data, rest = _data(rest, n_point_data, n_nodes)
     cell_data, rest = _data(rest, n_cell_data, n_cells)
     cell_data["material"] = np.array([int(words[1]) for words in cells])
-    try:
-        connectivity = [(KINDS[kind][0], np.array([[place[int(cells[i][3 + a])] for a in KINDS[kind][1]]
-                                                   for i in index])) for kind, index in blocks.items()]
-    except KeyError:
-        raise Unreadable("it has elements with nodes that do not exist") from None
-    return meshio.Mesh(points, connectivity, point_data=point_data,
-                       cell_data={name: [values[index] for index in blocks.values()]
+    return meshio.Mesh(rows[:, 1:], blocks, point_data=point_data,
+                       cell_data={name: [values[index] for index in kinds.values()]
                                   for name, values in cell_data.items()})
 
 
-def _data(lines: list[list[str]], count: int, n: int) -> tuple[dict[str, np.ndarray], list[list[str]]]:
+def _numbers(lines: list[list[bytes]], first: int, end: int, what: str) -> np.ndarray:
+    """Numbers of the words of lines from the `first` to the `end`, which is that of the lines."""
+    if any(len(words) != end for words in lines):
+        raise Unreadable(f"its {what} have lines of more or fewer words than {end}")
+    text = b" ".join(word for words in lines for word in words[first:])
+    return Text(text, f"its {what}").values.reshape(len(lines), -1)
+
+
+def _data(lines: list[list[bytes]], count: int, n: int) -> tuple[dict[str, np.ndarray], list[list[bytes]]]:
     """Data of one component by name, and the lines that follow; the order is that of nodes or cells."""
     if not count:
         return {}, lines
     sizes = [int(word) for word in lines[0][1:]]
-    names = [" ".join(words).partition(",")[0].strip() for words in lines[1:1 + len(sizes)]]
+    names = [b" ".join(words).partition(b",")[0].strip().decode(errors="replace") for words in lines[1:1 + len(sizes)]]
     rows = lines[1 + len(sizes):1 + len(sizes) + n]
-    values = np.array([[float(x) for x in row[1:]] for row in rows]).reshape(-1, sum(sizes))
-    if len(values) != n:
+    if len(rows) != n:
         raise Unreadable("it has data, but not as many as nodes or cells")
+    values = _numbers(rows, 1, 1 + sum(sizes), "data")
     first = np.cumsum([0, *sizes])
     return ({name: values[:, at] for name, at, size in zip(names, first, sizes) if size == 1},
             lines[1 + len(sizes) + n:])

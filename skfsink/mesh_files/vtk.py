@@ -73,6 +73,9 @@ class _File:
     def array(self, n: int, kind: str, what: str) -> np.ndarray:
         """The next `n` numbers."""
         where = f"its {what}"
+        if kind.lower() == "bit":
+            return (self.array(n, "char", what) if self.text
+                    else np.unpackbits(self.array(-(-n // 8), "unsigned_char", what))[:n])
         if (dtype := TYPES.get(kind.lower())) is None:
             raise Unreadable(f"{where} are of the type {kind[:20]}, which is not read")
         if self.text:
@@ -147,7 +150,10 @@ class _File:
         elif word == "FIELD":
             for _ in range(int(words[2])):
                 name, count, n, kind = self._field()
-                self._keep(into, name, self.array(count * n, kind, f"data {name}"), count)
+                if kind.lower() == "string":
+                    self._skip_strings(count * n)
+                else:
+                    self._keep(into, name, self.array(count * n, kind, f"data {name}"), count)
         elif word == "METADATA":
             while self.at < len(self.data) and self.line().strip():
                 pass
@@ -163,6 +169,16 @@ class _File:
         if len(words) != 4:
             raise Unreadable("it has a FIELD with an array without name, numbers and type")
         return words[0], int(words[1]), int(words[2]), words[3]
+
+    def _skip_strings(self, n: int) -> None:
+        """Pass over texts: lines, or bytes after their number, whose first two bits say how long it is."""
+        for _ in range(min(n, len(self.data))):
+            if self.text:
+                self.line()
+            else:
+                size = {3: 1, 2: 2, 1: 4, 0: 8}[self.data[self.at] >> 6]
+                length = int.from_bytes(self.data[self.at:self.at + size], "big") & ((1 << (8 * size - 2)) - 1)
+                self.at += size + length
 
     @staticmethod
     def _keep(into: dict[str, np.ndarray], name: str, values: np.ndarray, count: int) -> None:

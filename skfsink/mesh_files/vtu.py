@@ -26,8 +26,10 @@ from .vtk_cells import vtk_mesh
 
 __all__ = ["read_vtu"]
 
-TYPES = {f"{kind}{bits}": f"{letter}{bits // 8}" for kind, letter in (("Int", "i"), ("UInt", "u"), ("Float", "f"))
-         for bits in (8, 16, 32, 64) if letter != "f" or bits > 16}
+BIT = "Bit"
+TYPES = {BIT: "u1", "Float32": "f4", "Float64": "f8",
+         **{f"{kind}{8 * size}": f"{letter}{size}" for kind, letter in (("Int", "i"), ("UInt", "u"))
+            for size in (1, 2, 4, 8)}}
 
 
 def read_vtu(path: Path) -> meshio.Mesh:
@@ -115,6 +117,8 @@ class _Arrays:
             values = Text((array.text or "").encode(), f"its array {name}", kind[0] == "f").values.astype(kind)
         else:
             values = self._bytes(array, form, name, np.dtype(self.order + kind)).astype(kind)
+            if array.get("type") == BIT:
+                values = np.unpackbits(values)[:n]
         if n is not None and len(values) != n * components:
             raise Unreadable(f"its array {name} has {len(values)} values, not {n * components}")
         return values.reshape(-1, components) if components > 1 else values

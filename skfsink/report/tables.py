@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..history import onset_load
 from ..loader import ENERGIES, Run
 
 __all__ = ["Row", "Table", "cost_table", "energy_tables", "key_table", "number", "version_table"]
@@ -113,7 +114,7 @@ def key_table(runs: Sequence[Run], labels: Sequence[str], waves: Sequence[tuple[
         row("nominal strength", "MPa", "material_point", "nominal_strength_MPa"),
         row("nominal strength by theory, incompressible", "MPa", "material_point", "nominal_strength_theory_MPa"),
         row("displacement of the grips at the onset", "mm", "onset", "displacement_mm"),
-        row("load at the onset", force, "onset", "reaction_N_per_mm"),
+        _row("load at the onset", force, [onset_load(_get(run, "onset") or {}) for run in runs]),
         row("elastic energy at the onset", energy, "onset", "elastic_energy"),
         _row("where it begins to fail", "", [_beginning(run) for run in runs]),
         row("first arrival of the crack at an edge", "µs", "event", "first_arrival_s", factor=1e6),
