@@ -15,7 +15,8 @@ import meshio
 
 from .abaqus_cells import Cells
 from .abaqus_lines import Block, is_keyword_file, listed, read_blocks
-from .abaqus_parts import Named, Part, User, turned
+from .abaqus_parts import Named, Part, User
+from .abaqus_places import turned
 from .abaqus_sets import Body, Placed
 from .unreadable import Unreadable
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-
 import meshio
 import numpy as np
 
@@ -185,7 +183,8 @@ class Cells:
         none = np.zeros(0, np.int64)
         cell_sets = {name: [members.get(i, none) for i in range(len(cells))] for name, members in sets.items()}
         mesh = meshio.Mesh(self.body.points, cells, cell_sets=cell_sets, point_sets=points)
-        mesh.info = {"notes": [re.sub(r"[^ -~]", "?", note) if not note.isprintable() else note for note in self.notes]}
+        found = dict.fromkeys((*self.notes, *self.body.notes))
+        mesh.info = {"notes": [note if note.isprintable() else ascii(note)[1:-1] for note in found]}
         return mesh
 
     def _members(self, elements: np.ndarray) -> dict[int, np.ndarray]:

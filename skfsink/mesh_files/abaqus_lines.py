@@ -7,18 +7,14 @@ quotation marks.
 
 from __future__ import annotations
 
-import contextlib
-import math
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import numpy as np
-
 from .unreadable import Unreadable
 
-__all__ = ["Block", "Numbers", "file_size", "is_keyword_file", "listed", "number", "read_blocks"]
+__all__ = ["Block", "file_size", "is_keyword_file", "listed", "read_blocks", "words"]
 
 LARGEST = 2 * 10**9  # bytes of all files together
 DEEPEST = 8          # files within files
@@ -86,69 +82,6 @@ class Block:
                 yield i, words(text)
 
 
-class Numbers:
-    """Numbers of the data lines of a block: many at once if all lines are alike, else line by line.
-
-    Attributes
-    ----------
-    table: (lines, entries) if all lines have as many, else None.
-    """
-
-    def __init__(self, block: Block, whole: bool) -> None:
-        self.block, self.whole = block, whole
-        lines = [line.strip() for line in block.data]
-        self.at = [i for i, line in enumerate(lines) if line and not line.startswith("*")]
-        lines = [lines[i].rstrip(", \t") if lines[i][-1] == "," else lines[i] for i in self.at]
-        self.table: np.ndarray | None = None
-        if len(counts := {line.count(",") for line in lines}) == 1 and not any("_" in line for line in lines):
-            numbers = self.many(",".join(lines).split(","))
-            if numbers is not None:
-                self.table = numbers.reshape(len(lines), counts.pop() + 1)
-
-    def many(self, entries: list[str]) -> np.ndarray | None:
-        """Entries as numbers, or None if one is none (`1_0` is one in Python only)."""
-        with contextlib.suppress(ValueError, OverflowError):
-            return self._converted(entries)
-        if self.whole:
-            return None
-        with contextlib.suppress(ValueError, OverflowError):  # numbers of Fortran: 1.5D-3
-            return self._converted(",".join(entries).lower().replace("d", "e").split(","))
-        return None
-
-    def _converted(self, entries: list[str]) -> np.ndarray | None:
-        if self.whole:
-            return np.fromiter(map(int, entries), np.int64, len(entries))
-        numbers = np.fromiter(map(float, entries), float, len(entries))
-        return numbers if np.isfinite(numbers).all() else None
-
-    def rows(self) -> Iterator[tuple[int, list[float]]]:
-        """The data lines, each with its number and its entries; an empty one is 0 in the middle.
-
-        Raises
-        ------
-        Unreadable
-            An entry is no (whole) number, with its line.
-        """
-        for i in self.at:
-            entries = words(self.block.data[i].strip())
-            found = self.many(entries) if "_" not in self.block.data[i] else None
-            yield i, found.tolist() if found is not None else [number(self.block, i, word, self.whole)
-                                                              for word in entries]
-
-
-def number(block: Block, i: int, word: str, whole: bool = False) -> float:
-    """An entry of data line `i` as a number, a whole one if `whole`; "" is 0."""
-    if not word and not whole:
-        return 0.0
-    try:
-        value = int(word) if whole else float(word.lower().replace("d", "e"))
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value) or "_" in word or abs(value) > 2**62:
-        raise block.error(f"{word[:40]!r} is no {'whole' if whole else 'finite'} number", i)
-    return value
-
-
 def words(text: str) -> list[str]:
     """Entries between commas, without blanks around them and quotation marks; an empty last one is left out."""
     if '"' not in text and "'" not in text:
@@ -176,7 +109,7 @@ def is_keyword_file(path: Path) -> bool:
     """Whether the first line of a file that is not empty is a keyword or a comment of Abaqus."""
     with path.open("rb") as file:
         begin = file.read(4096)
-    return _decoded(begin[:len(begin) // 2 * 2]).lstrip("\ufeff \t\r\n\f").startswith("*")
+    return _decoded(begin).lstrip("\ufeff \t\r\n\f").startswith("*")
 
 
 def file_size(path: Path, largest: int = LARGEST) -> int:

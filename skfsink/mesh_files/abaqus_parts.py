@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from .abaqus_lines import Block, Numbers, number
+from .abaqus_lines import Block
+from .abaqus_numbers import Numbers, number
+from .abaqus_places import System
 from .abaqus_types import AXISYMMETRIC, ORDER, REFUSED, SIZE, cell_of
 from .unreadable import Unreadable
 
-__all__ = ["Elements", "Entry", "Named", "Part", "User", "turned"]
+__all__ = ["Elements", "Entry", "Named", "Part", "User"]
 
 
 @dataclass(frozen=True)
@@ -80,7 +81,7 @@ class Part:
         self.node_sets: dict[str, Named] = {}
         self.element_sets: dict[str, Named] = {}
         self.surfaces: dict[str, Named] = {}
-        self.system = (np.eye(3), np.zeros(3))
+        self.system = System()
 
     def read_nodes(self, block: Block) -> None:
         """`*NODE`."""
@@ -95,7 +96,7 @@ class Part:
             raise block.error(f"{numbers[wrong[0]]:g} is no number of a node", read.at[wrong[0]])
         points = np.zeros((len(table), 3))
         points[:, :min(3, table.shape[1] - 1)] = table[:, 1:4]
-        self.add_nodes(numbers.astype(np.int64), self._placed(points, block), block)
+        self.add_nodes(numbers.astype(np.int64), self.system.placed(points, block), block)
 
     def add_nodes(self, numbers: np.ndarray, points: np.ndarray, block: Block) -> None:
         """Nodes by number, into the set that the keyword names as well."""
@@ -114,6 +115,8 @@ class Part:
         if not self.nodes:
             return np.zeros(0, np.int64), np.zeros((0, 3))
         numbers, points = np.concatenate([n for n, _ in self.nodes]), np.concatenate([x for _, x in self.nodes])
+        if (np.diff(numbers) > 0).all():
+            return numbers, points
         kept, first, inverse = np.unique(numbers, return_index=True, return_inverse=True)
         if len(kept) < len(numbers):
             apart = (points[first][inverse] != points).any(axis=1)
@@ -125,34 +128,7 @@ class Part:
 
     def read_system(self, block: Block) -> None:
         """`*SYSTEM`: where the coordinates of the nodes that follow are."""
-        given: list[float] = []
-        for _, row in Numbers(block, whole=False).rows():
-            given += [*row, *[0.0] * (-len(row) % 3)]
-        if len(given) not in (0, 3, 6, 9):
-            raise block.error(f"*SYSTEM takes one, two or three points; got {len(given)} numbers")
-        a, b, c = (np.array(given[k:k + 3]) if len(given) > k else None for k in (0, 3, 6))
-        axes = np.eye(3)
-        if b is not None and (b != a).any():
-            along = (b - a) / np.linalg.norm(b - a)
-            up = np.cross(along, c - a) if c is not None else np.array([0.0, 0.0, 1.0])
-            up = up - (up @ along) * along
-            if np.linalg.norm(up) <= 1e-12 * max(1.0, float(np.abs(given).max())):
-                raise block.error("the points of *SYSTEM are on one line")
-            up /= np.linalg.norm(up)
-            axes = np.array([along, np.cross(up, along), up])
-        self.system = axes, np.zeros(3) if a is None else a
-
-    def _placed(self, points: np.ndarray, block: Block) -> np.ndarray:
-        kind = block.parameters.get("SYSTEM", "R").upper()[:1]
-        if kind in ("C", "S"):
-            r, theta = points[:, 0], np.radians(points[:, 1])
-            up = np.radians(points[:, 2]) if kind == "S" else None
-            flat, z = (r, points[:, 2]) if up is None else (r * np.cos(up), r * np.sin(up))
-            points = np.column_stack([flat * np.cos(theta), flat * np.sin(theta), z])
-        elif kind != "R":
-            raise block.error(f"SYSTEM={kind} is unknown: R, C or S")
-        axes, origin = self.system
-        return points if (axes == np.eye(3)).all() and not origin.any() else points @ axes + origin
+        self.system = System.of(block)
 
     def generate_nodes(self, block: Block) -> None:
         """`*NGEN` on a straight line."""
@@ -330,26 +306,3 @@ def _named(sets: dict[str, Named], name: str) -> Named:
 
 def _of(name: str) -> str:
     return f" of part {name[:60]!r}" if name else ""
-
-
-def turned(points: np.ndarray, block: Block) -> np.ndarray:
-    """Points (n, 3) moved and turned as the data lines of `*INSTANCE` say: first moved, then turned."""
-    lines = [row for _, row in Numbers(block, whole=False).rows()]
-    if not lines:
-        return points
-    if len(lines[0]) == 7:  # an empty first line
-        lines = [[0.0], *lines]
-    if len(lines) > 2 or len(lines[0]) > 3 or (len(lines) == 2 and len(lines[1]) != 7):
-        raise block.error("an instance is placed by a line of 3 and one of 7 numbers")
-    points = points + np.array([*lines[0], 0.0, 0.0][:3])
-    if len(lines) == 1 or not lines[1][6]:
-        return points
-    a, b, angle = np.array(lines[1][:3]), np.array(lines[1][3:6]), math.radians(lines[1][6])
-    if not (length := float(np.linalg.norm(b - a))) > 0:
-        raise block.error("the two points on the axis of its rotation are one", 1)
-    axis, from_a = (b - a) / length, points - a
-    quarter = round(lines[1][6] / 90)
-    cos, sin = ((1, 0, -1, 0)[quarter % 4], (0, 1, 0, -1)[quarter % 4]) if lines[1][6] == 90 * quarter else (
-        math.cos(angle), math.sin(angle))
-    along: np.ndarray = (from_a @ axis)[:, None] * axis
-    return a + along + cos * (from_a - along) + sin * np.cross(axis, from_a)

@@ -69,6 +69,7 @@ class Body:
     Attributes
     ----------
     points: (n, 3).
+    notes: what the user should know of it.
     blocks: elements of one keyword, the place of their first one, and their nodes by place (ne, k).
     placed: by name in small letters.
     """
@@ -78,6 +79,7 @@ class Body:
         self.blocks: list[tuple[Elements, int, np.ndarray]] = []
         self.points = np.zeros((0, 3))
         self.n_elements = 0
+        self.notes: list[str] = []
         self._known: dict[tuple[str, str, str], np.ndarray | None] = {}
 
     def place(self, name: str, part: Part, numbers: np.ndarray, points: np.ndarray) -> None:
@@ -193,7 +195,7 @@ class Body:
         return found
 
     def _faces(self, members: np.ndarray, entry: Entry, name: str, faces_are_cells: bool) -> Iterable[np.ndarray]:
-        face, used = entry.face, False
+        face, used = entry.face, 0
         for own, at, nodes in self.blocks:
             mine = members[(members >= at) & (members < at + len(nodes))] - at
             base = base_of(own.cell)
@@ -215,9 +217,10 @@ class Body:
             else:
                 raise entry.block.error(f"elements of type {own.kind} have no face {face[:10]!r}, which the surface "
                                         f"{name[:60]!r} names", entry.line)
-            used = True
-        if not used and len(members):
-            raise entry.block.error(f"the surface {name[:60]!r} is on elements that are no body", entry.line)
+            used += len(mine)
+        if used < len(members):
+            self.notes.append(f"the surface {name[:60]!r} ({entry.block.where}) has {len(members) - used} element(s) "
+                              "that are no body, and is without these")
 
     @property
     def free(self) -> list[np.ndarray]:
@@ -228,14 +231,16 @@ class Body:
             for own, at, nodes in self.blocks:
                 for k, form in enumerate(FACES.get(base_of(own.cell), ())):
                     if solid == (len(FACES[base_of(own.cell)][0]) > 2) and len(nodes):
-                        rows = np.full((len(nodes), 4), -1)
-                        rows[:, :len(form)] = np.sort(nodes[:, form], axis=1)
-                        corners.append(rows)
+                        own_rows = np.full((len(nodes), 4 if solid else 2), -1)
+                        own_rows[:, :len(form)] = np.sort(nodes[:, form], axis=1)
+                        corners.append(own_rows)
                         owner.append(at + np.arange(len(nodes)))
                         number.append(np.full(len(nodes), k))
             self._free = [np.zeros(self.n_elements, bool) for _ in range(6)]
             if corners:
-                _, inverse, count = np.unique(np.concatenate(corners), axis=0, return_inverse=True, return_counts=True)
+                rows = np.concatenate(corners)
+                keys = rows if solid else rows[:, 0] * len(self.points) + rows[:, 1]
+                _, inverse, count = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
                 single, places, faces = count[inverse.ravel()] == 1, np.concatenate(owner), np.concatenate(number)
                 for i, free in enumerate(self._free):
                     free[places[single & (faces == i)]] = True
