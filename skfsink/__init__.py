@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -46,3 +47,25 @@ def load(folder: str | Path) -> Run:
     from .loader import load as load_run  # only what is asked for is imported
 
     return load_run(folder)
+
+
+def _place_matplotlib() -> None:
+    """Let matplotlib, which is imported later, keep its list of fonts in a temporary folder if it cannot at home.
+
+    It would make a new folder in each process otherwise, and look for all fonts again.
+    """
+    if "MPLCONFIGDIR" in os.environ:
+        return
+    for variable, default in (("XDG_CONFIG_HOME", "~/.config"), ("XDG_CACHE_HOME", "~/.cache")):
+        place = Path(os.environ.get(variable) or os.path.expanduser(default)) / "matplotlib"
+        while not os.path.exists(place) and place != place.parent:
+            place = place.parent
+        if not os.access(place, os.W_OK | os.X_OK):
+            from .scratch import temporary_folder
+
+            if (folder := temporary_folder()) is not None:
+                os.environ["MPLCONFIGDIR"] = str(folder / "matplotlib")
+            return
+
+
+_place_matplotlib()

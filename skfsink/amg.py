@@ -8,10 +8,10 @@ from collections.abc import Callable
 import numpy as np
 import pyamg
 import scipy.sparse.linalg as sla
-from numba import njit
 from scipy.sparse import csc_array, csr_array
 
 from .direct import unsigned
+from .jit import njit
 
 __all__ = ["AmgCG", "residual"]
 
@@ -24,6 +24,9 @@ class AmgCG:
     past `DEAD` times the intact one: their value is settled by the smoother alone, and the intact hierarchy stays
     valid for the rest. It therefore never has to be rebuilt while damage spreads, nor does its cost depend on the
     path that led to the current state.
+
+    Memory: `iterations` and `residual`, of the last solve. `solve`, `iterate` and `restricted` depend on no earlier
+    call.
     """
 
     DEAD = 3.0           # of the intact diagonal

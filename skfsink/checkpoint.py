@@ -25,7 +25,8 @@ def _state_arrays(state: State) -> dict[str, np.ndarray]:
     times = np.array([t for t, _ in state.deletions])
     elements = np.array([e for _, e in state.deletions], np.int64)
     sink = {} if state.sink is None else {"sink": state.sink}
-    return {**{name: getattr(state, name) for name in _ARRAYS}, **sink, "deletion_times": times, "deletion_elements": elements}
+    return {**{name: getattr(state, name) for name in _ARRAYS}, **sink,
+            "deletion_times": times, "deletion_elements": elements}
 
 
 def _state_scalars(state: State) -> dict[str, Any]:
@@ -35,8 +36,8 @@ def _state_scalars(state: State) -> dict[str, Any]:
 
 def _rebuild(arrays: dict[str, np.ndarray], scalars: dict[str, Any]) -> State:
     log = list(zip(arrays["deletion_times"].tolist(), arrays["deletion_elements"].tolist()))
-    return State(**{name: arrays[name] for name in _ARRAYS}, sink=arrays.get("sink"), deletions=log, grip=scalars["grip"],
-                 time=scalars["time"], step=scalars["step"], phase=scalars["phase"],
+    return State(**{name: arrays[name] for name in _ARRAYS}, sink=arrays.get("sink"), deletions=log,
+                 grip=scalars["grip"], time=scalars["time"], step=scalars["step"], phase=scalars["phase"],
                  ledger=Ledger(**scalars["ledger"]))
 
 
@@ -72,7 +73,7 @@ def load_checkpoint(path: Path, fingerprint: str) -> tuple[State, dict[str, dict
         raise CheckpointError(f"the checkpoint {path} is damaged: {first}") from None
     if version != __version__:
         raise CheckpointError(f"the checkpoint {path} was written by skfsink {version}, this is {__version__}")
-    if found != fingerprint:
+    if found not in (fingerprint, fingerprint.partition("-")[0]):  # the latter is of an earlier version
         raise CheckpointError(f"the checkpoint {path} belongs to another scene than scene.toml beside it")
     memories: dict[str, dict[str, np.ndarray]] = {}
     for key, value in arrays.items():

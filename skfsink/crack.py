@@ -8,21 +8,26 @@ origin       the nodes that cracked first in a connected piece of the cracked se
 branches     The cracked set is cut into strips of width l by the graph distance from the origins. The pieces of
              neighbouring strips that touch are linked; pieces with nothing beyond them are ends. Ends nearer than
              2.5 l to the fork they come from are roughness of the crack's face, not branches. What is left counts.
-tip          the farthest node of an end. It is active while it is younger than 5 l/c_s, arrested after that.
+tip          the farthest node of an end. It is active while it is younger than 5 l/c_s, arrested after that; in a
+             quasi-static run, whose clock counts sweeps and no seconds, while it is younger than 10 sweeps.
 leading tip  the tip farthest, in a straight line, from the middle of its origin; that distance is the crack length.
-tip speed    slope of the line fitted by least squares to the crack length over the last 4 l/c_s.
-mean speed   crack length gained between its first passing l and the first arrival, over the time that took.
+tip speed    slope of the line fitted by least squares to the crack length over the last 4 l/c_s; 0 in sweeps.
+mean speed   crack length gained between its first passing l and the first arrival, over the time that took; none in
+             sweeps.
 first arrival  a connected piece of the cracked set touches the rim of the sample at two places, more than 3 l apart:
              the crack has reached an edge, a grip or another notch, or has met the crack that came from there. The
              rim is the outer boundary, in three dimensions without the surfaces along which a crack runs; a place is
-             a set of cracked nodes of the rim joined by edges of elements along it.
+             a set of cracked nodes of the rim joined by edges of elements along it. A plane of symmetry is no part of
+             the rim: there the body goes on as its image, and a piece that touches the plane has the images of its
+             places too.
 separation   no path of uncracked nodes joins two grips.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -31,9 +36,10 @@ from scipy.spatial.distance import cdist
 
 from .space import Space
 
-__all__ = ["CRACKED", "CrackTracker", "Tips"]
+__all__ = ["CRACKED", "CrackTracker", "Plane", "Tips"]
 
 CRACKED = 0.1
+ADVANCES = 10   # sweeps within which a tip that advances has cracked a node
 
 
 @dataclass(frozen=True)
@@ -55,30 +61,42 @@ class Tips:
     points: np.ndarray
 
 
+class Plane(NamedTuple):
+    """A plane of symmetry: the axis that is normal to it, and its nodes."""
+
+    axis: int
+    nodes: np.ndarray
+
+
 class CrackTracker:
     """Follows the crack through the nodal density, one call a record.
+
+    Memory: when each node cracked, the origins and the records so far; `mark`, `look`, `mean_speed` and `memory` tell
+    of the crack up to now. Times must not go back.
 
     Parameters
     ----------
     space: the spaces.
-    length_scale: l [mm].   shear_wave_speed: c_s [m/s].
+    length_scale: l [mm].   shear_wave_speed: c_s [m/s]; None if times are numbers of sweeps.
     grips: node numbers of each grip.
     rim: node numbers of the rim.
+    planes: of symmetry.
     """
 
-    def __init__(self, space: Space, length_scale: float, shear_wave_speed: float, grips: list[np.ndarray],
-                 rim: np.ndarray) -> None:
+    def __init__(self, space: Space, length_scale: float, shear_wave_speed: float | None, grips: list[np.ndarray],
+                 rim: np.ndarray, planes: Sequence[Plane] = ()) -> None:
         self.space, self.l = space, length_scale
-        self._transit = length_scale / (shear_wave_speed * 1e3)   # l/c_s [s]
-        self._grips, self._rim = grips, rim
+        #: l/c_s [s]; None if the clock counts sweeps
+        self._transit = None if shear_wave_speed is None else length_scale / (shear_wave_speed * 1e3)
+        self._grips, self._rim, self._planes = grips, rim, planes
         rows = np.repeat(np.arange(space.n_nodes), np.diff(space.graph.indptr))
         lengths = np.linalg.norm(space.X[rows] - space.X[space.graph.indices], axis=1)
         self._graph = csr_array((np.maximum(lengths, 1e-12), space.graph.indices, space.graph.indptr),
                                 shape=space.graph.shape)
-        self.cracked_at = np.full(space.n_nodes, np.inf)   #: time at which each node cracked [s]
+        self.cracked_at = np.full(space.n_nodes, np.inf)   #: time at which each node cracked [s, or sweep]
         self.origin = np.full(space.n_nodes, -1)           #: number of the origin a node belongs to, -1 for none
         self.track: list[tuple[float, float]] = []         #: (time, crack length) of the records
-        self.arrival: float | None = None                  #: time of the first arrival [s]
+        self.arrival: float | None = None                  #: time of the first arrival [s, or sweep]
         self.arrival_length = np.nan
         self.max_branches = 0
         self.separated = False
@@ -99,7 +117,7 @@ class CrackTracker:
         """Whether a piece of the cracked set joins two places of the rim."""
         rim = self._rim[np.isfinite(self.cracked_at[self._rim])]
         count, place = connected_components(self._graph[rim][:, rim], directed=False)
-        if count < 2:
+        if count < 2 - bool(self._planes):
             return False
         nodes = np.flatnonzero(np.isfinite(self.cracked_at))
         _, label = connected_components(self._graph[nodes][:, nodes], directed=False)
@@ -109,7 +127,17 @@ class CrackTracker:
             rivals = (place < k) & (piece == piece[here][0])
             if rivals.any() and cdist(X[here], X[rivals]).min() > 3 * self.l:
                 return True
-        return False
+        return any(self._meets_its_image(plane, rim, place, piece, nodes, label) for plane in self._planes)
+
+    def _meets_its_image(self, plane: Plane, rim: np.ndarray, place: np.ndarray, piece: np.ndarray, nodes: np.ndarray,
+                         label: np.ndarray) -> bool:
+        """Whether a piece of the cracked set (`label` of its `nodes`) joins a place of the rim to the image of it."""
+        touching = np.unique(label[np.isin(nodes, plane.nodes)])
+        height = np.abs(self.space.X[rim, plane.axis] - self.space.X[plane.nodes[0], plane.axis])
+        height[np.isin(rim, plane.nodes)] = 0.0
+        lowest = np.full(int(place.max(initial=-1)) + 1, np.inf)
+        np.minimum.at(lowest, place, height)
+        return bool((np.isin(piece, touching) & (2 * lowest[place] > 3 * self.l)).any())
 
     # --- every record ---
     def look(self, time: float, gamma: np.ndarray) -> Tips:
@@ -139,10 +167,13 @@ class CrackTracker:
             self.arrival_length = float(lengths[lead])
         self.separated = self.separated or self._apart(gamma)
         return Tips(tips[lead], float(lengths[lead]), self._speed(), len(ends),
-                    int((age < 5 * self._transit).sum()), tips)
+                    int((age < (ADVANCES if self._transit is None else 5 * self._transit)).sum()), tips)
 
     def mean_speed(self) -> float | None:
-        """Mean speed of the leading tip up to the first arrival, or to the last record before any [m/s]."""
+        """Mean speed of the leading tip up to the first arrival, or to the last record before any [m/s]; None where
+        there is none, as in sweeps."""
+        if self._transit is None:
+            return None
         track = np.array(self.track)
         started = track[:, 1] > self.l if len(track) else np.zeros(0, bool)
         if not started.any():
@@ -157,6 +188,8 @@ class CrackTracker:
         return float((last[1] - first[1]) / (last[0] - first[0])) * 1e-3
 
     def _speed(self) -> float:
+        if self._transit is None:
+            return 0.0
         window = [(t, x) for t, x in self.track if t >= self.track[-1][0] - 4 * self._transit]
         if len(window) < 3 or window[-1][0] <= window[0][0]:
             return 0.0

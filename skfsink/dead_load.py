@@ -20,6 +20,9 @@ class DeadLoad:
     A traction acts on the facets of the surface all of whose nodes belong to its boundary. The facets of an element
     that has lost its force, at all its Gauss points, bear no load any more.
 
+    Memory: the load time last given to `at` and the elements last given to `keep`; `at`, `keep`, `resultant`,
+    `potential`, `changed` and `effort` are of the loads as these left them.
+
     Parameters
     ----------
     space: the mesh.

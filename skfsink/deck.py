@@ -16,7 +16,6 @@ from __future__ import annotations
 import importlib
 import inspect
 import pkgutil
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -27,13 +26,14 @@ from .errors import OutputError, ParameterError
 from .options import Options
 from .result import Result
 from .tables import TABLES, joined, read_tables
+from .text import read_toml
 from .units import UNITS, number_in
 
 __all__ = ["CASES", "Deck", "case_function", "parameters_of", "read_deck", "read_value", "stored_case"]
 
 CASES = tuple(sorted(module.name for module in pkgutil.iter_modules(cases.__path__)))
-TOP = ("case", "parameters", "assumed", "choice")  # the last two are what a run says of itself; a deck may have them
-NOT_IN_A_DECK = ("out", "resume", "overwrite", "quiet", "corridor", "given")
+TOP = ("case", "parameters", "source", "assumed", "choice")  # the last three a run says of itself; a deck may have them
+NOT_IN_A_DECK = ("out", "resume", "overwrite", "quiet", "corridor", "kept", "given")
 LARGEST = 1_000_000  # bytes
 
 
@@ -92,8 +92,8 @@ def read_deck(path: Path) -> Deck:
             raise ParameterError(f"there is no deck {path}")
         if path.stat().st_size > LARGEST:
             raise ParameterError(f"{path} is no deck: it has more than {LARGEST:,} bytes")
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
+        data = read_toml(path)
+    except (OSError, ValueError, RecursionError) as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise ParameterError(f"{path} is no deck: {reason}") from None
     case, parameters = data.get("case"), data.setdefault("parameters", {})
@@ -126,8 +126,8 @@ def stored_case(folder: Path) -> str:
     if not path.is_file():
         raise OutputError(f"{folder} holds no run: there is no {path}")
     try:
-        case = tomllib.loads(path.read_text(encoding="utf-8"))["case"]
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, KeyError) as error:
+        case = read_toml(path)["case"]
+    except (OSError, ValueError, KeyError) as error:
         raise OutputError(f"{path} is not the scene of a run: {error}") from None
     if case not in CASES:
         raise OutputError(f"{path} is not the scene of a run: its case is {case!r}")
@@ -153,6 +153,8 @@ def read_value(name: str, value: Any, known: Mapping[str, Any]) -> Any:
         return value
     if isinstance(default, str):
         if not isinstance(value, str) or not value.isprintable():
-            raise ParameterError(f"{name} must be text; got {value!r}")
+            path = name == "mesh" and isinstance(value, str)
+            raise ParameterError(f"{name} must be text; got {value!r:.80}" + (
+                r": for \ in a path write /, or put the path in single quotes" if path else ""))
         return value
     return number_in(name, value, UNITS.get(name, ""))

@@ -19,7 +19,7 @@ __all__ = ["FACETS", "OBLIQUE", "SPENT", "Body", "Frame", "View", "bodies", "bod
 View = tuple[float, float]          # azimuth and elevation [degrees] from which a body in space is seen
 OBLIQUE = (-75.0, 60.0)
 SPENT = 1e-2        # nodes with a lower gamma carry nothing, and their displacement has no meaning
-LONGEST = 3.0       # stretch of an edge beyond which an element is torn
+TORN = 3.0          # times the stretch of what is whole around it: a cracked element that is stretched more is torn
 LEAST_PIECE = 0.02  # of the body; smaller fragments do not widen the axes
 
 # nodes of an element are numbered lexicographically (see `space`); facets go round as seen from outside
@@ -64,7 +64,9 @@ def live_elements(space: Space, frame: Frame) -> tuple[np.ndarray, np.ndarray]:
     """Elements to draw (nl,), and their corners on the deformed body [mm], (nl, na, dim).
 
     Left out are elements that are deleted, spent at every node, or torn apart. A spent node flies as it likes: each
-    element has it move with the nodes that are not spent, so that the lips of a crack part cleanly.
+    element has it move with the nodes that are not spent, so that the lips of a crack part cleanly. Torn is an element
+    with a cracked node, of which an edge is stretched `TORN` times as much as any around it that has none. What has not
+    cracked is drawn however far it is stretched.
     """
     holds = frame.gamma[space.conn] >= SPENT
     elements = np.flatnonzero(~frame.deleted & holds.any(axis=1))
@@ -72,8 +74,19 @@ def live_elements(space: Space, frame: Frame) -> tuple[np.ndarray, np.ndarray]:
     x = X + np.where(holds, u, np.sum(u, axis=1, where=holds, keepdims=True) / holds.sum(axis=1, keepdims=True))
     pairs = [(a, a | 1 << i) for i in range(space.dim) for a in range(2**space.dim) if not a >> i & 1]
     stretch = [np.linalg.norm(x[:, a] - x[:, b], axis=1) / np.linalg.norm(X[:, a] - X[:, b], axis=1) for a, b in pairs]
-    whole = np.max(stretch, axis=0) < LONGEST
-    return elements[whole], x[whole]
+    kept = ~_torn(space, elements, frame.gamma, np.max(stretch, axis=0))
+    return elements[kept], x[kept]
+
+
+def _torn(space: Space, elements: np.ndarray, gamma: np.ndarray, stretch: np.ndarray) -> np.ndarray:
+    """Mask of the elements (nl,), with their greatest stretch of an edge, that are torn apart."""
+    conn = space.conn[elements]
+    whole = (gamma[conn] >= CRACKED).all(axis=1)
+    around = np.zeros(space.n_nodes)  # greatest stretch of the whole elements at a node
+    np.maximum.at(around, conn[whole], stretch[whole, None])
+    usual = max(1.0, float(np.median(stretch[whole]))) if whole.any() else 1.0  # where none is near
+    beside = around[conn].max(axis=1)
+    return ~whole & (stretch > TORN * np.where(beside > 0, np.maximum(beside, 1.0), usual))
 
 
 def bodies(space: Space, frames: Sequence[Frame], view: View,

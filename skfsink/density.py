@@ -15,13 +15,13 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from scipy.sparse import csr_array
 
 from . import kernels
 from .amg import AmgCG
 from .direct import Factorization
 from .errors import ConvergenceError, ParameterError
+from .jit import njit
 from .material import SinkLaw
 from .regions import Region, by_element, check_lengths, rest_of
 from .space import Pattern, Space
@@ -54,6 +54,9 @@ class DensitySolver:
     """Solves for the nodal gamma, given the greatest stored energy W each Gauss point has seen.
 
     Its solutions are functions of the arguments alone: what it keeps between calls are counts.
+
+    Memory: counts, the `residual` of the last solve and the analysis of the matrix (`factorisations`). `solve` and
+    `update` depend on no earlier call.
 
     Parameters
     ----------
@@ -125,7 +128,7 @@ class DensitySolver:
             The history is not finite, or the lumped solution leaves (0, 1] by more than the solver's tolerance.
         """
         if not np.isfinite(W_max.max()):  # infinite, it would make a dead point in silence
-            raise ConvergenceError("the stored energy of a Gauss point is not finite: lower --courant or --hht-dt")
+            raise ConvergenceError("the stored energy of a Gauss point is not finite")
         sink = self.coefficients(W_max)
         if before.sink is not None and not _changed(sink, before.sink, self.unchanged):
             self.skipped += 1

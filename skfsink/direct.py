@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse.linalg as sla
-from numba import njit
 from scipy.sparse import csc_array, csr_array
 from threadpoolctl import ThreadpoolController
 
 from .errors import ConvergenceError
+from .jit import njit
 from .pattern import Pattern
 
 os.environ.setdefault("MKL_CBWR", "AUTO,STRICT")  # the same bits from one run to the next, whatever the alignment
@@ -36,6 +36,9 @@ def one_thread_of_openblas() -> AbstractContextManager[Any]:
 
 class Factorization:
     """Direct solver for symmetric matrices on one pattern (upper triangle); the analysis is done once.
+
+    Memory: the factors of the matrix last given to `factorize`, which `solve`, `apply` and `conjugate` use and
+    `release` drops; `factorize` itself depends on no earlier call.
 
     Parameters
     ----------

@@ -15,7 +15,7 @@ Every entry is computed from its own definition; none is what is left over from 
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 
 import numpy as np
 
@@ -25,6 +25,9 @@ __all__ = ["Ledger"]
 @dataclass
 class Ledger:
     """Energies [N mm; N mm/mm in 2D] since the start of the phase it belongs to.
+
+    Memory: all entries: `drop` books on, and `sink`, `balance`, `error` and `as_dict` sum up what has been booked so
+    far.
 
     Attributes
     ----------
@@ -63,9 +66,18 @@ class Ledger:
         return (self.elastic + self.loads + self.kinetic + self.sink + self.deletion + self.numerical + self.released
                 - self.initial - self.work)
 
+    @property
+    def turnover(self) -> float:
+        """The greatest of the energies, whatever its sign: what the ledger is about where there is no other scale."""
+        return max(abs(getattr(self, name)) for name in (field.name for field in fields(self)) if name != "paper")
+
+    def scale(self, onset: float) -> float:
+        """What errors are relative to: the elastic energy at the `onset`, without one what the ledger is about; > 0."""
+        return onset if onset > 0 else self.turnover or np.finfo(float).tiny
+
     def error(self, scale: float) -> float:
-        """|balance| relative to `scale`, usually the elastic energy at onset."""
-        return abs(self.balance) / scale if scale > 0 else 0.0
+        """|balance| relative to `scale`, usually the elastic energy at onset; without one, to the :attr:`turnover`."""
+        return abs(self.balance) / self.scale(scale)
 
     def drop(self, w: np.ndarray, W: np.ndarray, before: np.ndarray, after: np.ndarray) -> None:
         """Book the stored energy taken when the Gauss point densities fall from `before` to `after` at fixed W."""

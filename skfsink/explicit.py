@@ -23,12 +23,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from .deletion import delete_failed, left_in
 from .density import Density, DensitySolver
 from .errors import InstabilityError, require
 from .frequency import highest_frequency
+from .jit import njit
 from .loading import Loading
 from .momentum import Momentum
 from .space import Pattern
@@ -67,6 +67,10 @@ class ExplicitControls:
 
 class Explicit:
     """Integrates a :class:`State` from onset on.
+
+    Memory: step size and frequency estimate, forces, masses, the history in tiles, and active zones, all of the state
+    last stepped: after `begin`, `start` or `restore`, `run`, `step`, `update_density`, `sync` and `step_share` go on
+    with that one state; `memory` gives what a checkpoint needs.
 
     Parameters
     ----------
@@ -185,8 +189,11 @@ class Explicit:
             self._since_gamma = 0
             self.update_density(state)
         if state.step % 100 == 0 and not np.isfinite(kinetic + elastic):
-            raise InstabilityError(f"the explicit integration blew up at t = {state.time:.4g} s (step {state.step}): "
-                                   f"lower courant, now {self.controls.courant:g}")
+            self._blow_up(state)
+
+    def _blow_up(self, state: State) -> None:
+        raise InstabilityError(f"the explicit integration blew up at t = {state.time:.4g} s (step {state.step}): "
+                               f"lower courant, now {self.controls.courant:g}")
 
     def _turn(self, state: State) -> None:
         """At a knot: grips take their new velocities at once; what that needs is their work."""
@@ -200,6 +207,8 @@ class Explicit:
         """Solve for gamma from the history, book what the sink takes, delete failed elements."""
         momentum, ledger = self.momentum, state.ledger
         self.sync(state)
+        if not np.isfinite(state.W_max.max()):
+            self._blow_up(state)
         before = Density(state.gamma, state.sink, self._zones)
         now = self.density.update(state.W_max, before, self.GAMMA_TOLERANCE)
         if now is before:
@@ -255,6 +264,11 @@ class Explicit:
         self.dt = float(c.courant * 2.0 / (self._omega * np.sqrt(max(1.0, ratio))))
         if not c.gamma_every:
             self.dt = min(self.dt, self._interval)  # in plane stress the stable step may be longer
+
+    def step_share(self, state: State) -> float:
+        """The step over the stability limit of `state` as it is now; nothing is changed."""
+        omega, _ = highest_frequency(self.momentum, self._pattern, self.free, state.u, self.mass, self._mode)
+        return 0.5 * self.dt * max(omega, self._indicator(state.u) ** 0.5)
 
     def _indicator(self, u: np.ndarray) -> float:
         """A lower bound of omega_max^2 that follows it closely; see :meth:`.Momentum.stiffest`."""

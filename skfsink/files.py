@@ -10,7 +10,9 @@ from pathlib import Path
 
 from .errors import OutputError
 
-__all__ = ["prepare_folder", "replaced", "reported", "write_atomic"]
+__all__ = ["HIDDEN", "prepare_folder", "replaced", "reported", "write_atomic"]
+
+HIDDEN = (".lock", ".running")  # files of a lock, see :mod:`.occupied`; a folder that has no others is empty
 
 
 @contextmanager
@@ -62,7 +64,7 @@ def prepare_folder(path: str | Path, overwrite: bool = False) -> Path:
         if path.exists() and not path.is_dir():
             raise OutputError(f"the output folder {path} is a file")
         path.mkdir(parents=True, exist_ok=True)
-        if not overwrite and any(path.iterdir()):
+        if not overwrite and any(entry.name not in HIDDEN for entry in path.iterdir()):
             raise OutputError(f"the output folder {path} is not empty; name another one, or allow to overwrite it")
         tempfile.TemporaryFile(dir=path).close()
     return path

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.linalg as la
-from numba import njit
 
 from .direct import add_symmetric_product
 from .errors import ConvergenceError, InstabilityError
+from .jit import njit
 from .momentum import Momentum
 from .pattern import Pattern
 
@@ -52,8 +52,7 @@ def _lanczos(indptr: np.ndarray, indices: np.ndarray, data: np.ndarray, start: n
             following = np.empty_like(start)
             alpha, beta = _step(indptr, indices, data, vectors[-1], previous, beta, following)
             if not np.isfinite(alpha + beta):
-                raise InstabilityError("the tangent of the body is not finite: the explicit integration has blown up; "
-                                       "lower --courant")
+                raise InstabilityError("the tangent of the body is not finite: the explicit integration has blown up")
             diagonal.append(alpha)
             last = len(diagonal) - 1
             values, modes = la.eigh_tridiagonal(diagonal, beside, select="i", select_range=(last, last))

@@ -19,8 +19,9 @@ class Gauge:
 
     The load is the force on the first grip that ever moves, along its motion; of one that follows ramps that is its
     motion in the last stretch of time in which it moves, or away from where it began if it moves back then. The
-    displacement is that of this grip relative to the last other one, in the same direction. Without a grip that moves they are those of the first traction: its force, and
-    the mean displacement of its boundary relative to that of the last other traction, or to the grips.
+    displacement is that of this grip relative to the last other one, in the same direction. Without a grip that moves
+    they are those of the first traction: its force, and the mean displacement of its boundary relative to that of the
+    last other traction, or to the grips.
     """
 
     def __init__(self, scene: Scene, loading: Loading) -> None:

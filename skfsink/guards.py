@@ -14,8 +14,9 @@ from types import TracebackType
 import numpy as np
 
 from . import indicators
-from .errors import InstabilityError
+from .errors import InstabilityError, SkfsinkError
 from .momentum import Momentum
+from .overlap import overlap
 from .regions import Region, by_element
 from .scene import Scene
 from .state import State
@@ -30,6 +31,8 @@ class Notes(logging.Handler):
 
     As a context manager it listens to all modules of the package. Two warnings are the same if they were made from the
     same text, whatever the numbers in it.
+
+    Memory: the warnings `kept`; `emit` leaves out one that came up before, `texts` has all so far.
 
     Parameters
     ----------
@@ -70,6 +73,9 @@ class Notes(logging.Handler):
 class Guard:
     """Watches one run of a scene.
 
+    Memory: evenness and energy at the onset, and failed elements at the last step; `check_step`, `check_record` and
+    `even` judge by them.
+
     Parameters
     ----------
     scene: what is computed, with the tolerance `balance_tolerance` of its ledger.
@@ -88,6 +94,7 @@ class Guard:
     SUDDEN = 0.05, 20      # share of the elements, and their number, that may fail in one step
     DEAD = 0.2             # mean density below which a body is gone
     EVEN = 0.8, 0.9        # of the greatest W/Phi, and the share of the body from which on it is loaded evenly
+    DEEPER = 1.5           # times the depth at which an overlap was first seen, that is told at the end
     CARRIED = 0.01         # energy in deleted elements, of the onset energy, that is warned of
 
     def __init__(self, scene: Scene, momentum: Momentum) -> None:
@@ -96,8 +103,10 @@ class Guard:
         self.scale = 0.0     #: energy at the onset, to which the others are compared
         self.evenness = 0.0  #: share of the body that was loaded about as much as its weakest point at the onset
         self.dissolved = False  #: whether a body that was loaded evenly has failed everywhere at once
+        self.step_share: Callable[[], float] = lambda: np.inf  #: explicit step over its stability limit, now
         self._deleted = -1   # elements at the last step
         self._inside_out = False
+        self.overlaps: list[float] = []  #: depth [mm] to which faces overlapped when that was first seen, and the greatest
 
     @property
     def _step_cure(self) -> str:
@@ -105,8 +114,18 @@ class Guard:
         if c.analysis == "quasistatic":
             return f"raise --front (now {c.statics.front:g}), or compute with --analysis dynamic"
         if c.integrator == "explicit":
+            if (share := self._share_of_limit()) <= 1.0:
+                return (f"a shorter step is no cure, since this one is {share:.2f} of its stability limit: refine the "
+                        f"mesh there, or take --integrator hht")
             return f"lower --courant (now {c.explicit.courant:g})"
         return f"lower --hht-dt (now {c.hht.dt:g} s)"
+
+    def _share_of_limit(self) -> float:
+        """The explicit step over its stability limit; infinite where that cannot be told any more."""
+        try:
+            return self.step_share()
+        except SkfsinkError:
+            return np.inf
 
     # --- before the run ---
     def check_scene(self) -> None:
@@ -175,9 +194,14 @@ class Guard:
         V = self.space.V
         return float(V[ratio >= self.EVEN[0] * ratio.max()].sum() / V.sum())
 
+    @property
+    def even(self) -> bool:
+        """Whether the body was loaded evenly at the onset, as a material point is."""
+        return self.evenness > self.EVEN[1]
+
     def _has_dissolved(self) -> bool:
         """Whether this body may fail everywhere at once, since it is loaded evenly; it has, then."""
-        self.dissolved = self.dissolved or self.evenness > self.EVEN[1]
+        self.dissolved = self.dissolved or self.even
         return self.dissolved
 
     def _check_pressure(self, state: State) -> None:
@@ -282,6 +306,33 @@ class Guard:
         else:
             log.warning("a live Gauss point is compressed to J = %.2g (below %g): elements soon turn inside out there; "
                         "refine the mesh where it is pressed", least, self.FLAT)
+
+    # --- at the frames ---
+    def check_overlap(self, state: State) -> None:
+        """Faces of a notch or a crack that have passed through each other; costs as much as a few steps."""
+        found = overlap(self.space, state.u, state.gamma, state.deleted)
+        if found is None:
+            return
+        first, most = self.overlaps or (found.depth, found.depth)
+        self.overlaps = [first, max(most, found.depth)]
+        log.warning("faces pass through each other by %.3g mm at %s, near %s mm of the undeformed body (%.2g of the "
+                    "element there): there is no contact, and what follows is a body that reaches into itself; end the "
+                    "loading before they meet, or give the notch more width", found.depth, self._when(state),
+                    _place(found.place), found.depth / found.size)
+
+    def check_stress(self, state: State, crushed: np.ndarray) -> None:
+        """Elements, a mask (ne,), whose stress is unknown, see :func:`.cauchy_stress`."""
+        if crushed.any():
+            first = self.space.conn[int(np.argmax(crushed))]
+            log.warning("the stress of %d element(s) is not known at %s, as of one near %s mm: a point that exerts a "
+                        "force is crushed or inside out there; frames have NaN for it, and 1 in the field crushed. Refine "
+                        "the mesh where it is pressed, or raise --force-floor", crushed.sum(), self._when(state),
+                        _place(self.space.X[first].mean(axis=0)))
+
+    def check_end(self) -> None:
+        """Say to what depth faces have passed through each other, if that was more than when it was first seen."""
+        if self.overlaps and self.overlaps[1] > self.DEEPER * self.overlaps[0]:
+            log.warning("faces have passed through each other by up to %.3g mm: there is no contact", self.overlaps[1])
 
     @property
     def _deletion_cure(self) -> str:

@@ -51,6 +51,10 @@ class _Trial(NamedTuple):
 class HHT:
     """Integrates a :class:`State`; see the module for the scheme.
 
+    Memory: step size, forces, inertia and masses of the last accepted state: after `begin`, `start` or `restore`, `run`
+    and `step` go on with that one state; `memory` gives what a checkpoint needs. An attempt that is given up leaves
+    nothing behind but a shorter step.
+
     Parameters
     ----------
     momentum, density: the two fields.
@@ -236,7 +240,11 @@ class HHT:
                 momentum.force(u)
                 if not (momentum.least_J > self.LEAST_J and np.isfinite(momentum.energy)):
                     return None, iteration
-                gamma, density = density.gamma, self.density.update(np.maximum(state.W_max, momentum.W), density)
+                gamma = density.gamma
+                try:
+                    density = self.density.update(np.maximum(state.W_max, momentum.W), density)
+                except ConvergenceError:  # of a trial that stretches points beyond what the sink can take
+                    return None, iteration
                 last, change = change, float(np.abs(density.gamma - gamma).max())
                 settled = change <= c.gamma_tolerance
                 growing = growing + 1 if change > last else 0

@@ -14,13 +14,14 @@ import numpy as np
 from .errors import OutputError
 from .files import reported, write_atomic
 
-__all__ = ["HISTORY_COLUMNS", "History", "Table", "history_header", "history_units"]
+__all__ = ["HISTORY_COLUMNS", "History", "Table", "deletions_header", "history_header", "history_units",
+           "load_name", "onset_load"]
 
 #: Columns of a history, in order, with their meaning. Energies are those of :class:`.energy.Ledger`.
 HISTORY_COLUMNS: dict[str, str] = {
     "phase": "phase of the run",
     "step": "load increments, sweeps or time steps taken in the phase",
-    "time_s": "time since the start of the phase",
+    "time_s": "time since the start of the phase; 0 in sweeps, which have none",
     "grip_displacement_mm": "displacement of a grip",
     "reaction_N_per_mm": "force on a grip along its motion",
     "elastic": "gamma-weighted stored energy",
@@ -69,6 +70,24 @@ def history_header(dim: int) -> list[str]:
     return [name.removesuffix(_SUFFIX[plane[name]]) + _SUFFIX[unit] for name, unit in history_units(dim).items()]
 
 
+def load_name(dim: int) -> str:
+    """Name of the load in files: it says N/mm of a plane body and N of one in space."""
+    return "reaction_N_per_mm" if dim == 2 else "reaction_N"
+
+
+def onset_load(onset: Mapping[str, Any]) -> Any:
+    """The load in the `onset` of a summary, under either name; None if it is not there.
+
+    Summaries of schema 1 have `reaction_N_per_mm` for bodies in space too, with a value in N.
+    """
+    return onset.get("reaction_N", onset.get("reaction_N_per_mm"))
+
+
+def deletions_header(clock: str) -> list[str]:
+    """Columns of `deletions.csv` of an event whose clock counts "s" or "sweep"."""
+    return ["time_s" if clock == "s" else "sweep", "element"]
+
+
 class Table(dict[str, np.ndarray]):
     """Columns of a history by name: of `HISTORY_COLUMNS`, or as they stand in the header of the file.
 
@@ -90,6 +109,8 @@ class Table(dict[str, np.ndarray]):
 
 class History:
     """The table of a run, a row at each recorded time, in memory and in a file that grows with it.
+
+    Memory: the `rows`; `append` adds to them, `columns` has all so far.
 
     Parameters
     ----------

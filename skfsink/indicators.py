@@ -6,7 +6,8 @@ import numpy as np
 
 from .space import Space
 
-__all__ = ["alternation", "element_pressure", "greatest_stretch", "inverted", "mean_density", "size_near", "turning"]
+__all__ = ["alternation", "element_pressure", "greatest_stretch", "inverted", "mean_density", "size_near", "turning",
+           "turnings"]
 
 
 def turning(space: Space) -> tuple[float, np.ndarray]:
@@ -14,6 +15,16 @@ def turning(space: Space) -> tuple[float, np.ndarray]:
 
     A round notch meshed by n elements turns by 180/n at a node, a square one by 90, a slit by 180; convex corners do
     not count. The angle is that of the body around the node or edge, less 180 degrees.
+    """
+    nodes, angles = turnings(space)
+    worst = int(np.argmax(angles))
+    return float(angles[worst]), space.X[nodes[worst]].mean(axis=0)
+
+
+def turnings(space: Space) -> tuple[np.ndarray, np.ndarray]:
+    """The node (m, 1), or the two nodes of an edge (m, 2), and the angle (m,) of :func:`turning` for each of them.
+
+    The angle is negative where the surface turns outwards, and -180 inside.
     """
     dim, conn = space.dim, space.conn
     corners = np.arange(2**dim)
@@ -37,9 +48,8 @@ def turning(space: Space) -> tuple[float, np.ndarray]:
     places, where = np.unique(np.concatenate(keys), return_inverse=True)
     around = np.bincount(where, np.concatenate(angles), len(places))
     around[np.bincount(where, np.concatenate(on_surface), len(places)) == 0] = 0.0
-    worst = int(np.argmax(around))
-    nodes = [places[worst]] if dim == 2 else divmod(int(places[worst]), space.n_nodes)
-    return float(np.degrees(around[worst]) - 180.0), space.X[[*nodes]].mean(axis=0)
+    nodes = places[:, None] if dim == 2 else np.stack(np.divmod(places, space.n_nodes), axis=1)
+    return nodes, np.degrees(around) - 180.0
 
 
 def _key(nodes: np.ndarray, n: int) -> np.ndarray:

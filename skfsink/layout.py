@@ -22,7 +22,7 @@ from .errors import MeshError, ParameterError
 from .halving import Mirror, Whole, cut
 from .meshing import read_mesh
 from .options import Options
-from .sample import Sample, load_sample, shape_sample
+from .sample import Sample, kept_sample, load_sample, shape_sample
 from .scene import Grip
 from .shapes import SHAPES
 from .sweeping import swept
@@ -88,6 +88,8 @@ def arrange(case: str, own: Mapping[str, Any], options: Options, grips: tuple[Gr
 
 def _sample(case: str, own: Mapping[str, Any], options: Options, body: Lift) -> Sample:
     shape, name = SHAPES[case], own["mesh"]
+    if options.kept is not None:
+        return kept_sample(options.kept)
     if options.mesh_layout == "two-pass" and options.corridor is not None:
         path = options.corridor
         if not path.is_file():

@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import csv
 import io
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -21,9 +20,10 @@ import numpy as np
 
 from .errors import OutputError
 from .files import reported
-from .history import History, Table
+from .history import History, Table, deletions_header
 from .output import SUMMARY, frame_times, read_summary
 from .tables import joined
+from .text import read_toml
 
 if TYPE_CHECKING:
     from .scene import Scene
@@ -32,7 +32,7 @@ __all__ = ["ENERGIES", "FIELD_UNITS", "Deletions", "Energy", "Frames", "Run", "l
 
 #: Units of the fields of a frame.
 FIELD_UNITS = {"displacement": "mm", "velocity": "mm/s", "gamma": "1", "deleted": "1", "W": "MPa", "gamma_element": "1",
-               "stress": "MPa", "pressure": "MPa", "von_mises": "MPa", "region": "1"}
+               "stress": "MPa", "pressure": "MPa", "von_mises": "MPa", "crushed": "1", "region": "1"}
 #: Rows of :attr:`Run.energies`: name, columns of the history that add up to it, meaning.
 ENERGIES: tuple[tuple[str, tuple[str, ...], str], ...] = (
     ("elastic", ("elastic",), "elastic energy, γ-weighted"),
@@ -60,7 +60,7 @@ class Energy(NamedTuple):
 
 
 class Deletions(NamedTuple):
-    """Failed elements in the order they failed: time [s], or sweep, and number of the element."""
+    """Failed elements in the order they failed: time in :attr:`Run.clock` and number of the element."""
 
     time: np.ndarray
     element: np.ndarray
@@ -71,7 +71,7 @@ class Frames(Sequence[meshio.Mesh]):
 
     Attributes
     ----------
-    times: of the frames [s]; numbers of sweeps in a quasi-static run, load times [s] in one that did not fail.
+    times: of the frames, in :attr:`Run.clock`: [s], or numbers of sweeps; load times [s] in a run that did not fail.
     name: "run", or "loading" for the frames of the loading.
     moments: frame number of onset, branching, arrival and end, as far as they happened.
     units: of the fields.
@@ -128,7 +128,8 @@ class Run:
     ----------
     folder: of the run.
     summary: content of `summary.json`; empty if the run is not finished.
-    case, parameters, assumed, choice: content of `scene.toml`.
+    case, parameters, assumed, choice: content of `scene.toml`; the mesh is the file that was given to the run, not the
+        copy that this keeps.
     parts: of `analysis="both"` the two runs, "dynamic" and "quasistatic", as far as they were begun; otherwise empty.
     """
 
@@ -154,6 +155,11 @@ class Run:
     def verdict(self) -> str:
         """What became of the run, in one line; empty if it is not finished."""
         return " | ".join(str(part.summary.get("verdict", "")) for part in self.runs if part.summary)
+
+    @property
+    def clock(self) -> str:
+        """What times of frames and deletions count: "s", or "sweep" in a quasi-static run, which has no time."""
+        return "sweep" if self.analysis == "quasistatic" else "s"
 
     @property
     def warnings(self) -> list[str]:
@@ -196,7 +202,7 @@ class Run:
             text = path.read_text(encoding="utf-8", errors="replace")
         try:
             header, *rows = csv.reader(text.splitlines())
-            if header != ["time_s", "element"]:
+            if header not in (deletions_header("s"), deletions_header("sweep")):  # "s" of sweeps too, formerly
                 raise ValueError
             return Deletions(np.array([float(time) for time, _ in rows]), np.array([int(e) for _, e in rows], int))
         except ValueError:
@@ -244,11 +250,13 @@ def load(folder: str | Path) -> Run:
         raise OutputError(f"{folder} holds no run: there is no {path}")
     try:
         with reported(f"cannot read {path}"):
-            data = tomllib.loads(path.read_text(encoding="utf-8"))
+            data = read_toml(path)
         case = str(data["case"])
         parameters = joined(data, case == "custom")
+        if "source" in data:
+            parameters["mesh"] = str(data["source"])
         assumed, choice = tuple(map(str, data.get("assumed", ()))), dict(data.get("choice", {}))
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError, KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError) as error:
         raise OutputError(f"{path} is not the scene of a run: {error}") from None
     summary = read_summary(folder) if (folder / SUMMARY).exists() else {}
     parts = {name: load(folder / name) for name in ("dynamic", "quasistatic")

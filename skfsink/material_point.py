@@ -37,8 +37,8 @@ def mean_stress(space: Space, force: np.ndarray) -> np.ndarray:
 def beside_theory(scene: Scene, F: np.ndarray, P: np.ndarray) -> dict[str, Any] | None:
     """The greatest nominal stress of an evenly loaded body beside the peak of its homogeneous path (Eq. 7, 10).
 
-    `F` and `P` (3, 3) are the mean deformation gradient and nominal stress [MPa] where the load was greatest. None where
-    the deformation is no tension that the theory has a curve of, or the body has several materials, or fibres.
+    `F` and `P` (3, 3) are the mean deformation gradient and nominal stress [MPa] where the load was greatest. None
+    where the deformation is no tension that the theory has a curve of, or the body has several materials, or fibres.
     """
     if len(scene.parts) > 1 or isinstance(scene.material, GeneralMaterial):
         return None

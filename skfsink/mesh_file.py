@@ -19,6 +19,8 @@ import numpy as np
 import psutil
 
 from .errors import MeshError, SkfsinkError
+from .kept_mesh import SUFFIX, read_kept
+from .mesh_files.abaqus_lines import file_size, is_keyword_file
 from .mesh_files.orientation import oriented
 from .mesh_files.tidy import tidied
 from .meshing import read_mesh
@@ -72,16 +74,22 @@ def read_mesh_file(path: Path, raw: bool = False) -> meshio.Mesh:
     try:
         status = os.stat(path)
     except (OSError, ValueError):
-        raise MeshError(f"there is no mesh file {shown}") from None
+        cure = r": folders are parted by / here, not by \ as on Windows" if "\\" in str(path) and os.sep == "/" else ""
+        raise MeshError(f"there is no mesh file {shown}{cure}") from None
     if not stat.S_ISREG(status.st_mode):
         raise MeshError(f"there is no mesh file {shown}: what has that name is no file with content")
     if status.st_size > LARGEST:
         raise MeshError(f"{failure}: it has {status.st_size / 1e9:.1f} GB, the most is {LARGEST / 1e9:.0f} GB")
-    suffix = path.suffix.lower()
-    if suffix in POINTERS or (suffix == ".inp" and _includes(path)):
+    suffix, size = path.suffix.lower(), status.st_size
+    if suffix in POINTERS:
         raise MeshError(f"{failure}: it names other files; put the mesh into one file, such as VTU")
-    with _room(max(ROOM[0], ROOM[1] * status.st_size)):
-        mesh = quietly(lambda: read_mesh(path), failure)
+    if suffix == ".inp" and is_keyword_file(path):
+        try:
+            size = file_size(path, LARGEST)
+        except (OSError, ValueError) as error:
+            raise MeshError(f"{failure}: {one_line(str(error))}") from None
+    with _room(max(ROOM[0], ROOM[1] * size)):
+        mesh = quietly(lambda: read_kept(path) if suffix == SUFFIX else read_mesh(path), failure)
         quietly(lambda: _sound(mesh), failure)
     check_indices(shown, mesh)
     if raw:
@@ -114,7 +122,9 @@ def check_mesh(name: str, mesh: meshio.Mesh) -> None:
                         f"they reach over {2 * extents[2]:g} mm")
     nodes = np.sort(mesh.cells_dict[kind].astype(np.int64), axis=1)
     if (twice := (nodes[:, 1:] == nodes[:, :-1]).any(axis=1)).any():
-        raise MeshError(f"mesh {name}: element {int(twice.argmax())} is inverted or degenerate: it has a node twice")
+        raise MeshError(f"mesh {name}: element {int(twice.argmax())} is inverted or degenerate: it has a node twice; "
+                        f"if that is how your program writes triangles or wedges, convert it with skfsink mesh {name} "
+                        f"OUT.vtu")
     rows = np.ascontiguousarray(nodes).view(np.dtype((np.void, nodes.itemsize * nodes.shape[1]))).ravel()
     if (again := len(rows) - len(np.unique(rows))):
         raise MeshError(f"mesh {name} has {again} element(s) more than once")
@@ -149,13 +159,6 @@ def _sound(mesh: meshio.Mesh) -> meshio.Mesh:
     for members in mesh.cell_sets.values():
         members[:] = [None if index is None else np.asarray(index, np.int64).ravel() for index in members]
     return mesh
-
-
-def _includes(path: Path) -> bool:
-    with contextlib.suppress(OSError), path.open("rb") as file:
-        return any(line.lstrip().replace(b"*", b"").partition(b",")[0].strip().lower() == b"include"
-                   for line in file if line.lstrip().startswith(b"*"))
-    return False
 
 
 @contextlib.contextmanager

@@ -37,6 +37,9 @@ class Part(NamedTuple):
 class Momentum:
     """Internal force and its derivatives (Eq. 14-19, 28) for the relative density last given.
 
+    Memory: the density last given to `set_gamma` and the load time last given to `set_time`: `force`, `tangent`,
+    `stiffest` and the masses are for these. `potential`, `W` and `energy` are of the last `force`.
+
     Parameters
     ----------
     space, material: the spaces and the stored energy, of the elements that are in no region.

@@ -22,6 +22,10 @@ __all__ = ["Newton"]
 class Newton:
     """Finds displacements in equilibrium between grips, at the density and dead loads last given to `momentum`.
 
+    Memory: factors of a tangent, which later calls use as long as they serve: of which equilibrium within `tolerance`
+    is found, in how many steps, depends on earlier calls to `equilibrium` and `predict`, whether their increments were
+    taken or given up. `memory` gives what they were made from.
+
     Parameters
     ----------
     momentum: forces and tangents.

@@ -3,8 +3,8 @@
 Grips and dead loads follow the load time, the clock of the loading. Up to a sharp limit the loaded body is elastic
 and gamma hardly moves; beyond it no stable equilibrium exists. Loading looks for that limit, the *onset*, by bisection
 on the load. Before a crack can begin the whole body may soften: the load then falls while the grips go on. Such
-equilibria are followed as long as they are stable, which is tested there (see :meth:`StaticLoading.stable`), so that the
-onset is the last stable state, and the strength the greatest load on the way to it.
+equilibria are followed as long as they are stable, which is tested there (see :meth:`StaticLoading.stable`), so that
+the onset is the last stable state, and the strength the greatest load on the way to it.
 """
 
 from __future__ import annotations
@@ -76,6 +76,10 @@ class _Settled(NamedTuple):
 
 class StaticLoading:
     """Equilibria of a body between grips.
+
+    Memory: the next increment and the factors of :class:`.Newton`; `load` goes on from them, `stable` uses the factors,
+    `memory` gives both. Of an increment that is given up only its length and these factors are left; the fields are
+    those of the state.
 
     Parameters
     ----------
@@ -331,9 +335,9 @@ class StaticLoading:
     # --- checkpoints ---
     def memory(self) -> dict[str, np.ndarray]:
         """What loading remembers beyond the state."""
-        return {"increment": np.array(self.increment), **self.newton.memory()}
+        return {"increment": np.array(self.increment), "unfailed": np.array(self.unfailed), **self.newton.memory()}
 
     def restore(self, memory: dict[str, np.ndarray]) -> None:
         """Take up what :meth:`memory` gave."""
-        self.increment = float(memory["increment"])
+        self.increment, self.unfailed = float(memory["increment"]), str(memory["unfailed"])
         self.newton.restore(memory)

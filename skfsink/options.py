@@ -12,14 +12,25 @@ from cyclopts import Group, Parameter, Token
 from .errors import ParameterError, require
 from .explicit import ExplicitControls
 from .hht import HHTControls
-from .material import AAA, LIMITERS, Material, SinkLaw, material_of
+from .material import (
+    AAA,
+    LIMITERS,
+    MATERIALS,
+    MODULI,
+    Material,
+    SinkLaw,
+    constant_names,
+    constants_text,
+    material_of,
+    own_constants,
+)
 from .scene import Controls, choose
 from .statics import StaticsControls
 
 __all__ = ["LAYOUTS", "QUANTITIES", "SAMPLE", "Options"]
 
 # say where a run goes, or how its model was chosen, not what it is
-NOT_PHYSICS = ("model", "tolerance", "quantity", "corridor", "out", "resume", "overwrite", "quiet", "given")
+NOT_PHYSICS = ("model", "tolerance", "quantity", "corridor", "out", "resume", "overwrite", "quiet", "kept", "given")
 LAYOUTS = ("corridor", "uniform", "two-pass")
 QUANTITIES = ("onset_load", "onset_displacement", "U", "D", "arrival_time", "tip_speed", "crack_path")
 
@@ -79,7 +90,9 @@ class Options:
     c2
         Second constant of aaa [MPa], >= 0.
     constants
-        Constants of another law than aaa, as "mu = 0.27 MPa, limit = 76.5"; those left out have their defaults.
+        Constants of another law than aaa, as "mu = 0.27 MPa, limit = 76.5"; those left out have their defaults. Of
+        all laws but hgo also "E = 1 MPa, nu = 0.499" or "G = 0.33 MPa, nu = 0.499" in place of bulk_modulus and of
+        mu or c1.
     bulk_modulus
         Bulk modulus k [MPa], > 0.
     density
@@ -147,6 +160,8 @@ class Options:
         Show no progress.
     corridor
         Mesh that the first of two passes has left; set by the run.
+    kept
+        Mesh of the body that the run has left in its folder; set by the run.
     given
         Names of the options that a command line gave; a resumed run checks that they are its own.
     """
@@ -196,6 +211,7 @@ class Options:
     overwrite: Annotated[bool, OUTPUT, FLAG] = False
     quiet: Annotated[bool, OUTPUT, FLAG] = False
     corridor: Annotated[Path | None, Parameter(parse=False)] = None
+    kept: Annotated[Path | None, Parameter(parse=False)] = None
     given: Annotated[frozenset[str], Parameter(parse=False)] = frozenset()
 
     def __post_init__(self) -> None:
@@ -215,16 +231,34 @@ class Options:
 
     def stored_energy(self) -> Material:
         """The material."""
-        if self.material == "aaa":
-            if self.constants:
-                raise ParameterError(f"constants are those of another law than aaa, whose are c1 and c2; "
-                                     f"got {self.constants!r}")
+        if self.material == "aaa" and not self.constants.strip():
             return AAA(self.bulk_modulus, self.density, self.c1, self.c2)
-        for name in ("c1", "c2"):
-            if getattr(self, name) != getattr(Options, name):
-                raise ParameterError(f"{name} is a constant of aaa; those of {self.material} go into constants; "
-                                     f"got {getattr(self, name)!r}")
-        return material_of(self.material, self.constants, self.bulk_modulus, self.density)
+        text = self._constants()
+        of_nu = own_constants(self.material, text)[1] if self.material in MATERIALS else None
+        if of_nu is not None and ("bulk_modulus" in self.given or self.bulk_modulus != Options.bulk_modulus):
+            raise ParameterError(f"bulk_modulus {self.bulk_modulus!r} MPa and the nu of the constants ({of_nu:.6g} "
+                                 f"MPa) say the same: give one of them")
+        return material_of(self.material, text, self.bulk_modulus, self.density)
+
+    def _constants(self) -> str:
+        """Text of the constants of the law, with those of aaa that are options of their own."""
+        changed = [name for name in ("c1", "c2") if name in self.given or getattr(self, name) != getattr(Options, name)]
+        if self.material != "aaa":
+            for name in changed:
+                if getattr(self, name) != getattr(Options, name):
+                    raise ParameterError(f"{name} is a constant of aaa; those of {self.material} go into constants; "
+                                         f"got {getattr(self, name)!r}")
+            return self.constants
+        names = constant_names("aaa", self.constants)
+        if not names <= set(MODULI):
+            raise ParameterError(f"constants are those of another law than aaa, whose are c1 and c2, or E, G and nu; "
+                                 f"got {self.constants!r}")
+        stiff = names & {"E", "G"}
+        if stiff and "c1" in changed:
+            raise ParameterError(f"c1 {self.c1!r} MPa and the {min(stiff)} of the constants say the same: give one of "
+                                 f"them")
+        own = {"c2": require("c2", self.c2, "MPa"), **({} if stiff else {"c1": require("c1", self.c1, "MPa")})}
+        return ", ".join([*(f"{name} = {value!r} MPa" for name, value in own.items()), self.constants])
 
     def sink_law(self) -> SinkLaw:
         """The sink and flux laws."""
@@ -242,6 +276,14 @@ class Options:
             StaticsControls(front=self.front))
 
     def parameters(self) -> dict[str, Any]:
-        """The options that decide results, by name; the energy limiter is that of the law where it was 0."""
+        """The options that decide results, by name; the energy limiter is that of the law where it was 0.
+
+        E, G and nu have become constants of the law and the bulk modulus.
+        """
         chosen = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in NOT_PHYSICS}
+        if set(MODULI) & constant_names(self.material, self.constants):
+            material = self.stored_energy()
+            chosen |= {"bulk_modulus": material.bulk_modulus, "constants": constants_text(material)}
+            if isinstance(material, AAA):
+                chosen |= {"c1": material.c1, "constants": ""}
         return {**chosen, "phi": self.sink_law().phi}

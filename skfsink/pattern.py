@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numba import njit
 from scipy.sparse import csr_array
+
+from .jit import njit
 
 if TYPE_CHECKING:
     from .space import Space

@@ -9,7 +9,16 @@ import meshio
 import numpy as np
 
 from .output import History
-from .plot import Frame, animation, comparison_picture, density_picture, ledger_picture, loading_picture, speed_picture, tip_picture
+from .plot import (
+    Frame,
+    animation,
+    comparison_picture,
+    density_picture,
+    ledger_picture,
+    loading_picture,
+    speed_picture,
+    tip_picture,
+)
 from .recorder import Recorder
 from .scene import Scene
 

@@ -24,6 +24,7 @@ from PIL import Image
 
 from . import deformed
 from .deformed import OBLIQUE, Body, Frame, View
+from .history import Table, history_units
 from .output import replaced, write_atomic
 from .space import Space
 
@@ -192,7 +193,8 @@ def _event(history: History) -> tuple[dict[str, np.ndarray], np.ndarray, str, st
     if not rows.size:
         raise ValueError("the history has no rows of the event")
     event = {name: values[rows] for name, values in history.items()}
-    unit = "N mm" if np.isfinite(history["tip_z_mm"]).any() else "N mm/mm"
+    in_space = history.dim == 3 if isinstance(history, Table) else np.isfinite(history["tip_z_mm"]).any()
+    unit = history_units(3 if in_space else 2)["elastic"]
     if np.ptp(event["time_s"]) > 0:
         return event, event["time_s"] * 1e6, "time since onset (µs)", unit
     return event, event["step"].astype(float), "sweep", unit

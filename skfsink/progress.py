@@ -18,7 +18,10 @@ __all__ = ["Display", "Interrupt"]
 
 
 class Display:
-    """A progress line a phase with the figures below it; a line every ten seconds where there is no terminal."""
+    """A progress line a phase with the figures below it; a line every ten seconds where there is no terminal.
+
+    Memory: the phase begun last, which `update` shows and `phase` ends.
+    """
 
     LOG_EVERY = 10.0  # seconds
 
@@ -73,6 +76,8 @@ class Interrupt:
 
     A second Ctrl-C stops at once; so does a step that goes on for `PATIENCE` after the first: its KeyboardInterrupt
     leaves the checkpoint that was written last.
+
+    Memory: whether a signal was `received`, which `heeded` tells.
     """
 
     PATIENCE = 5.0  # seconds

@@ -11,10 +11,12 @@ from .crack import CrackTracker, Tips
 from .density import DensitySolver
 from .gauge import Gauge
 from .guards import Guard
+from .history import deletions_header
 from .loading import Loading
 from .material_point import mean_deformation, mean_stress
 from .momentum import Momentum
 from .output import History, Series, prepare_folder, write_atomic
+from .places import beginning, check_beginning, rim_of
 from .scene import Scene
 from .state import State
 from .stress import cauchy_stress, pressure, von_mises
@@ -27,12 +29,16 @@ class Recorder:
 
     `memory` is what :meth:`memory` gave for a checkpoint, to go on from there.
 
+    Memory: rows, frames, moments and the crack so far. `loading`, `loading_frame`, `unfailed`, `reached_onset`,
+    `start`, `watch`, `frame` and `finish` add to them, in the order of the run; `memory` gives what a checkpoint needs.
+
     Attributes
     ----------
     tracker: the crack.   tips: the crack at the last record.   guard: watches the run.
     moments: frame number of each key moment: onset, branching, arrival, end.
     onset, at_arrival: figures noted at those moments.
-    greatest: load, displacement, mean deformation gradient F and nominal stress P where the load was greatest while the body was loaded.
+    greatest: load, displacement, mean deformation gradient F and nominal stress P [MPa] where the load was greatest
+        while the body was loaded.
     loading_frames: time and label of the frames of the loading.
     """
 
@@ -46,8 +52,10 @@ class Recorder:
         names = [*(grip.boundary for grip in scene.grips), *(traction.boundary for traction in scene.tractions)]
         held = [sample.nodes(name) for name in dict.fromkeys(names)]
         # a tip in the slowest material has to have moved between two looks at it
-        self.tracker = CrackTracker(space, scene.sink_law.length_scale, momentum.shear_wave_speeds[0], held,
-                                    sample.rim(*scene.faces))
+        self.clock = "sweep" if scene.controls.analysis == "quasistatic" else "s"   #: unit of the time of the event
+        self.tracker = CrackTracker(space, scene.sink_law.length_scale,
+                                    momentum.shear_wave_speeds[0] if self.clock == "s" else None, held,
+                                    *rim_of(scene))
         self._cells = {"region": scene.region_numbers} if scene.regions else {}
         if memory is None:
             prepare_folder(folder / "series", overwrite=True)
@@ -61,9 +69,9 @@ class Recorder:
         self.greatest: dict[str, Any] = dict(memory.get("greatest", {}))
         self.frames: list[tuple[float, str]] = [(float(t), str(label)) for t, label in memory["frames"]]
         self.moments: dict[str, int] = dict(memory["moments"])
-        self.onset: dict[str, float] = dict(memory["onset"])
+        self.onset: dict[str, Any] = dict(memory["onset"])
         self.at_arrival: dict[str, float] = dict(memory["at_arrival"])
-        self.separated_at = float(memory.get("separated_at", np.inf))   #: first record after the separation [s]
+        self.separated_at = float(memory.get("separated_at", np.inf))   #: first record after the separation [s, or sweep]
         self.series.resume(len(self.frames))  # this may refuse, before any file is touched
         self.loading_series.resume(len(self.loading_frames))
         self.history = History(folder / "history.csv", memory["rows"], space.dim)
@@ -73,6 +81,8 @@ class Recorder:
         quasistatic = controls.analysis == "quasistatic"
         self.guard = Guard(scene, momentum)
         self.guard.scale, self.guard.evenness = (self.onset.get(name, 0.0) for name in ("elastic_energy", "evenness"))
+        self.guard.dissolved = bool(memory.get("dissolved", False))
+        self.guard.overlaps = list(memory.get("overlaps", []))
         self._waiting = controls.start == "rest"
         self._record_every = 1.0 if quasistatic else controls.record_every
         self._frame_every = 10.0 if quasistatic else controls.frame_every
@@ -80,6 +90,7 @@ class Recorder:
     # --- loading ---
     def loading(self, state: State, reaction: np.ndarray, way: float = 0.0) -> None:
         """Row of a load increment, and a frame where the `way` of the loading (in largest increments) asks for one."""
+        self.guard.check_overlap(state)
         row = self._row(state, reaction, self.tips, 0.0)
         self.history.append(row)
         load = row["reaction_N_per_mm"]
@@ -102,6 +113,7 @@ class Recorder:
             self.loading_frame(state)
         self.loading_frames[-1] = (state.time, "end")
         self.moments = {"end": len(self.loading_frames) - 1}
+        self.guard.check_end()
         self._close(state)
 
     def reached_onset(self, state: State, reaction: np.ndarray) -> None:
@@ -109,7 +121,8 @@ class Recorder:
         self.onset = {"displacement_mm": self.gauge.displacement(state), "reaction_N_per_mm": self.load(reaction),
                       "elastic_energy": state.ledger.elastic, "gamma_min": float(state.gamma.min()),
                       "sink": state.ledger.sink, "work": state.ledger.work,
-                      "loading_balance": state.ledger.balance}
+                      "loading_balance": state.ledger.balance, **beginning(self.scene, state)}
+        check_beginning(self.scene, state)
         self.guard.scale = state.ledger.elastic
         self.guard.check_onset(state)
         self.onset["evenness"] = self.guard.evenness
@@ -156,16 +169,19 @@ class Recorder:
         """Last row and frame, and the log of deleted elements."""
         self._record(state, reaction, dt)
         self.frame(state, "end")
+        self.guard.check_end()
         self._close(state)
 
     def _close(self, state: State) -> None:
         self.series.flush()
         self.loading_series.flush()
-        log = "".join(f"{time!r},{element}\n" for time, element in state.deletions)
-        write_atomic(self.history.path.with_name("deletions.csv"), "time_s,element\n" + log)
+        log = "".join(f"{int(time) if self.clock == 'sweep' else time!r},{element}\n"
+                      for time, element in state.deletions)
+        write_atomic(self.history.path.with_name("deletions.csv"), ",".join(deletions_header(self.clock)) + "\n" + log)
 
     def frame(self, state: State, label: str) -> None:
         """Add the state to the ParaView series."""
+        self.guard.check_overlap(state)
         if label:
             self.moments[label] = len(self.frames)
         self.frames.append((state.time, label))
@@ -174,12 +190,14 @@ class Recorder:
     def _add(self, series: Series, state: State) -> None:
         momentum, space = self.momentum, self.scene.sample.space
         stress = cauchy_stress(momentum, state.u)
+        crushed = np.isnan(stress).any(axis=1)
+        self.guard.check_stress(state, crushed)
         series.add(
             state.time,
             {"displacement": state.u, "velocity": state.v, "gamma": state.gamma},
             {"deleted": state.deleted.astype(np.int8), "W": space.element_mean(np.minimum(momentum.W, 1e3)),
              "gamma_element": space.element_mean(momentum.gamma), "stress": stress, "pressure": pressure(stress),
-             "von_mises": von_mises(stress), **self._cells})
+             "von_mises": von_mises(stress), "crushed": crushed.astype(np.int8), **self._cells})
 
     def _record(self, state: State, reaction: np.ndarray, dt: float) -> None:
         self.tips = self.tracker.look(state.time, state.gamma)
@@ -210,5 +228,7 @@ class Recorder:
         self.series.flush()  # a checkpoint names its frames
         self.loading_series.flush()
         return {"rows": self.history.rows, "frames": self.frames, "loading_frames": self.loading_frames,
-                "framed": self._framed, "greatest": self.greatest, "moments": self.moments, "onset": self.onset,
-                "at_arrival": self.at_arrival, "separated_at": self.separated_at}
+                "dissolved": self.guard.dissolved, "framed": self._framed, "greatest": self.greatest,
+                "moments": self.moments, "onset": self.onset,
+                "at_arrival": self.at_arrival, "separated_at": self.separated_at,
+                "overlaps": self.guard.overlaps}

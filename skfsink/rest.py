@@ -13,7 +13,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from .crack import CRACKED
 from .density import DensitySolver
+from .errors import ParameterError
 from .hht import HHT, HHTControls
 from .loading import Loading
 from .momentum import Momentum
@@ -47,6 +49,9 @@ class LoadingFromRest:
                  controls: HHTControls, deletion: float = 1e-6, threads: int = 1) -> None:
         size = float(np.ptp(momentum.space.X, axis=0).max())
         speed = Loading.of(momentum.space, free, motion).speed(0.0)
+        if not speed > 0.0:
+            raise ParameterError("start rest needs a grip that moves from the beginning on; all of them are still: "
+                                 "give one a velocity, or take start onset")
         self._fast = self.FAST * speed
         longest = max(self.INCREMENT * size / speed, 2 * controls.dt)
         self._last = controls.dt
@@ -65,6 +70,7 @@ class LoadingFromRest:
         """Load `state` to the onset, yielding it after each step; the last one is the onset."""
         if state.step == 0:
             self.integrator.begin(state)
-        while self.integrator.dt > self._last and float(np.abs(state.v).max()) < self._fast:
+        while (self.integrator.dt > self._last and float(np.abs(state.v).max()) < self._fast
+               and state.gamma.min() >= CRACKED):  # under fast grips the body cracks before it is faster than they are
             self.integrator.step(state)
             yield state

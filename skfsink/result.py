@@ -1,4 +1,4 @@
-"""The result of a run: its summary (schema version 1), its history and its last state."""
+"""The result of a run: its summary (schema version 2), its history and its last state."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from .history import history_units, load_name
 from .material_point import beside_theory
 from .output import versions
 from .quantities import measured
@@ -20,7 +21,7 @@ from .verdict import greatest_ratio, verdict
 
 __all__ = ["SCHEMA", "Result", "summarize"]
 
-SCHEMA = 1
+SCHEMA = 2   # 1 had "reaction_N_per_mm" for the force [N] on bodies in space, and no "units"
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +62,7 @@ def summarize(scene: Scene, simulation: Simulation) -> dict[str, Any]:
     ledger, onset, tracker = state.ledger, recorder.onset, recorder.tracker
     space, cost = scene.sample.space, simulation.cost()
     dynamic = scene.controls.analysis == "dynamic"
+    units = history_units(space.dim)
     balances = [abs(row["balance"]) for row in recorder.history.rows if row["phase"] != "loading"]
     ratio, place = greatest_ratio(simulation.density, state)
     return {
@@ -68,11 +70,14 @@ def summarize(scene: Scene, simulation: Simulation) -> dict[str, Any]:
         "integrator": scene.controls.integrator if dynamic else None, "verdict": verdict(scene, simulation),
         "elements": space.n_elements, "dofs": int(simulation.free.sum()) + space.n_nodes,
         "unknowns": {"displacement": int(simulation.free.sum()), "density": space.n_nodes},
+        "units": {"load": units["reaction_N_per_mm"], "energy": units["elastic"]},
         "loading": {"greatest_load": recorder.greatest.get("load"),
                     "displacement_at_greatest_load_mm": recorder.greatest.get("displacement_mm"),
                     "greatest_W_over_phi": ratio, "place_of_greatest_W_over_phi_mm": place},
         "material_point": _material_point(scene, simulation),
-        "onset": {k: onset.get(k) for k in ("displacement_mm", "reaction_N_per_mm", "elastic_energy", "gamma_min")},
+        "onset": {"displacement_mm": onset.get("displacement_mm"),
+                  load_name(space.dim): onset.get("reaction_N_per_mm"),
+                  **{k: onset.get(k) for k in ("elastic_energy", "gamma_min", "place_mm", "boundary")}},
         "event": {"first_arrival_s": tracker.arrival if dynamic else None,
                   "first_arrival_sweep": None if dynamic else tracker.arrival,
                   "mean_tip_speed_m_per_s": tracker.mean_speed() if dynamic else None,
@@ -98,7 +103,7 @@ def summarize(scene: Scene, simulation: Simulation) -> dict[str, Any]:
 
 def _material_point(scene: Scene, simulation: Simulation) -> dict[str, Any] | None:
     """Strength beside theory of a body that was loaded evenly."""
-    greatest, guard = simulation.recorder.greatest, simulation.recorder.guard
-    if guard.evenness < guard.EVEN[1] or "F" not in greatest or scene.tractions:
+    greatest = simulation.recorder.greatest
+    if not simulation.recorder.guard.even or "F" not in greatest or scene.tractions:
         return None
     return beside_theory(scene, np.array(greatest["F"]), np.array(greatest["P"]))

@@ -6,17 +6,21 @@ import importlib
 import inspect
 import logging
 import shlex
-import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
 from .checkpoint import load_checkpoint, load_state
-from .corridor import MESH, corridor_report, has_gmsh, lay_corridor
+from .checks import refuse
+from .corridor import MESH as CORRIDOR
+from .corridor import corridor_report, has_gmsh, lay_corridor
 from .errors import OutputError, ParameterError
+from .kept_mesh import MESH, keep_mesh, mesh_name, origin
 from .memory import check_memory
 from .models import AUTO, choose_model
+from .occupied import occupied
 from .options import NOT_PHYSICS, Options
 from .output import History, prepare_folder, write_atomic, write_summary
 from .pictures import draw_comparison, draw_run
@@ -25,12 +29,14 @@ from .result import Result, summarize
 from .scene import Scene, read_choice, read_parameters
 from .simulate import Interrupted, Simulation, onset_copy
 from .state import State
+from .text import read_toml
 
 __all__ = ["read_scene", "run_case"]
 
 log = logging.getLogger(__name__)
 SceneMaker = Callable[[dict[str, Any], Options], Scene]
 SCENE, SUMMARY = "scene.toml", "summary.json"
+PARTS = ("dynamic", "quasistatic")  # folders of the two runs of both analyses
 
 
 def run_case(case: Callable[..., Result], make_scene: SceneMaker, own: dict[str, Any], options: Options) -> Result:
@@ -54,9 +60,9 @@ def run_case(case: Callable[..., Result], make_scene: SceneMaker, own: dict[str,
     elif options.model:
         options, choice = choose_model(name, own, defaults, options)
     folder = options.resume or options.out or _default_folder(name, own, options)
-    note = ""
+    notes: list[str] = []
     if options.mesh_layout == "two-pass" and not has_gmsh():
-        note = "there is no gmsh to make the mesh of two passes: the mesh of the layout corridor is taken"
+        notes.append("there is no gmsh to make the mesh of two passes: the mesh of the layout corridor is taken")
         options = replace(options, mesh_layout="corridor")
     try:
         with Display(options.quiet) as display:
@@ -65,14 +71,22 @@ def run_case(case: Callable[..., Result], make_scene: SceneMaker, own: dict[str,
             scene = replace(make_scene(own, options), choice=choice)
             check_memory(scene, display)
             if not resume:
-                _begin(folder, options.overwrite)
-                if options.mesh_layout == "two-pass":
-                    options = lay_corridor(scene, own, options, folder, display)
-                    scene = replace(make_scene(own, options), choice=choice)
-                    check_memory(scene, display)
-            if options.analysis == "both":
-                return _run_both(scene, folder, display, resume, note)
-            return _run_one(scene, folder, display, resume, note=note)
+                refuse(scene)  # before anything is written
+            with ExitStack() as locks:
+                places = [folder, *(folder / part for part in PARTS if options.analysis == "both")]
+                there = [place for place in places if place == folder or place.exists()]
+                notes += [locks.enter_context(occupied(place)) for place in there]
+                if not resume:
+                    _begin(folder, options.overwrite)
+                    if options.mesh_layout == "two-pass":
+                        options = lay_corridor(scene, own, options, folder, display)
+                        scene = replace(make_scene(own, options), choice=choice)
+                        check_memory(scene, display)
+                        refuse(scene)
+                notes += [locks.enter_context(occupied(place)) for place in places if place not in there]
+                if options.analysis == "both":
+                    return _run_both(scene, folder, display, resume, notes)
+                return _run_one(scene, folder, display, resume, notes=notes)
     except (Interrupted, KeyboardInterrupt):
         begun = (folder / SCENE).exists()
         raise Interrupted("interrupted; " + (f"go on with skfsink resume {shlex.quote(str(folder))}" if begun else
@@ -91,29 +105,34 @@ def read_scene(folder: Path) -> Scene:
     if not path.is_file():
         raise OutputError(f"{folder} holds no run: there is no {path}")
     try:
-        case = str(tomllib.loads(path.read_text(encoding="utf-8"))["case"])
+        case = str(read_toml(path)["case"])
         module = importlib.import_module(f"skfsink.cases.{case}")
         stored = read_parameters(folder, case)
         own = {name: stored.pop(name, p.default)
                for name, p in inspect.signature(getattr(module, case)).parameters.items() if name != "options"}
-        options = replace(Options(), **stored, corridor=_corridor(folder))
-    except (ModuleNotFoundError, UnicodeDecodeError, tomllib.TOMLDecodeError, AttributeError, KeyError,
-            TypeError) as error:
+        options = replace(Options(), **stored, corridor=_corridor(folder), kept=_kept(folder, own))
+    except (ModuleNotFoundError, ValueError, AttributeError, KeyError, TypeError) as error:
         raise OutputError(f"{path} is not the scene of a run: {error}") from None
     scene: Scene = module._scene(own, options)
     return scene
 
 
+def _kept(folder: Path, own: Mapping[str, Any]) -> Path | None:
+    """Mesh that a run has left in its folder, where the parameters do not name it: one that was made by gmsh."""
+    return None if Path(own["mesh"]).suffix or not (folder / MESH).is_file() else folder / MESH
+
+
 def _corridor(folder: Path) -> Path:
     """Mesh of two passes of a run, or of the two runs that it is one of."""
-    above = folder.parent / MESH
-    return above if not (folder / MESH).exists() and above.exists() else folder / MESH
+    above = folder.parent / CORRIDOR
+    return above if not (folder / CORRIDOR).exists() and above.exists() else folder / CORRIDOR
 
 
 def _default_folder(case: str, own: dict[str, Any], options: Options) -> Path:
-    name = f"{Path(own['mesh']).stem}-{options.analysis}"
+    mesh = mesh_name(own["mesh"])
+    name = f"{mesh}-{options.analysis}"
     if options.model:
-        return Path("results") / case / f"{Path(own['mesh']).stem}-{options.model}"
+        return Path("results") / case / f"{mesh}-{options.model}"
     if options.analysis != "quasistatic" and options.integrator != "explicit":
         name += f"-{options.integrator}"
     return Path("results") / case / name
@@ -131,7 +150,8 @@ def _resumed(case: str, own: dict[str, Any], defaults: dict[str, Any],
                              f"a resumed run keeps its scene")
     defaults = {**Options().parameters(), **defaults}
     for name, value in {**own, **options.parameters()}.items():
-        if (name in options.given or value != defaults[name]) and value != stored.get(name):
+        same = value == stored.get(name) or (name == "mesh" and origin(value) == origin(str(stored.get(name))))
+        if (name in options.given or value != defaults[name]) and not same:
             raise ParameterError(f"--{name.replace('_', '-')} {value} is not that of the run in {folder} "
                                  f"({stored.get(name)}); a resumed run keeps its scene")
     known = {f.name for f in fields(Options)} - set(NOT_PHYSICS)
@@ -141,7 +161,7 @@ def _resumed(case: str, own: dict[str, Any], defaults: dict[str, Any],
             raise KeyError(*sorted(unknown))
     except KeyError as error:
         raise OutputError(f"{folder / SCENE} is not the scene of a run: parameter {error}") from None
-    return own, replace(options, **stored, corridor=_corridor(folder)), choice
+    return own, replace(options, **stored, corridor=_corridor(folder), kept=_kept(folder, own)), choice
 
 
 def _begin(folder: Path, overwrite: bool) -> None:
@@ -151,8 +171,16 @@ def _begin(folder: Path, overwrite: bool) -> None:
         (folder / name).unlink(missing_ok=True)
 
 
-def _run_both(scene: Scene, folder: Path, display: Display, resume: bool, note: str) -> Result:
-    scenes = {analysis: scene.part(analysis) for analysis in ("dynamic", "quasistatic")}
+def _write_scene(scene: Scene, folder: Path) -> None:
+    """Write `scene.toml`, and before it the mesh unless it is one that comes with the program."""
+    if scene.sample.source or scene.sample.made:
+        keep_mesh(scene.sample, folder / MESH)
+    write_atomic(folder / SCENE, scene.toml(MESH))
+
+
+def _run_both(scene: Scene, folder: Path, display: Display, resume: bool,
+              notes: Sequence[str]) -> Result:
+    scenes = {analysis: scene.part(analysis) for analysis in PARTS}
     begun = {analysis: resume and (folder / analysis / SCENE).exists() for analysis in scenes}
     for analysis, part in scenes.items():  # refuse before any file is touched
         if begun[analysis]:
@@ -162,13 +190,13 @@ def _run_both(scene: Scene, folder: Path, display: Display, resume: bool, note: 
     if not resume:
         for analysis in scenes:
             _begin(folder / analysis, overwrite=True)
-        write_atomic(folder / SCENE, scene.toml())
+        _write_scene(scene, folder)
     parts: dict[str, Result] = {}
     onset: State | None = None
     for analysis, part in scenes.items():
         if not begun[analysis]:
             _begin(folder / analysis, overwrite=True)
-        parts[analysis] = _run_one(part, folder / analysis, display, begun[analysis], onset, note)
+        parts[analysis] = _run_one(part, folder / analysis, display, begun[analysis], onset, notes)
         if parts[analysis].failed:
             onset = load_state(folder / "dynamic" / Simulation.ONSET, scenes["dynamic"].fingerprint)
     display.phase("output")
@@ -183,14 +211,14 @@ def _run_both(scene: Scene, folder: Path, display: Display, resume: bool, note: 
 
 
 def _run_one(scene: Scene, folder: Path, display: Display, resume: bool, onset: State | None = None,
-             note: str = "") -> Result:
+             notes: Sequence[str] = ()) -> Result:
     simulation = Simulation(scene, folder, display, resume)
-    if note:
-        with simulation.notes:
+    with simulation.notes:
+        for note in filter(None, notes):
             log.warning(note)
     if not resume:
         simulation.checkpoint()  # from here on the run can be resumed, whenever it is killed
-        write_atomic(folder / SCENE, scene.toml())
+        _write_scene(scene, folder)
     space = scene.sample.space
     for text in scene.sample.notes:
         display.say(f"note: {text}")

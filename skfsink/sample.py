@@ -17,12 +17,14 @@ from skfem.io.meshio import INV_HEX_MAPPING
 from .errors import MeshError, ParameterError, require
 from .mesh_file import check_mesh, one_line, quietly, read_mesh_file
 from .mesh_files.pieces import check_one_piece, hinges, merged
+from .mesh_files.split import counted, needs_split
 from .mesh_files.tidy import notes_of, place
 from .meshing import read_mesh
 from .shapes import SHAPES
 from .space import Space
 
-__all__ = ["Sample", "data_folder", "data_roots", "file_sample", "load_sample", "shape_mesh", "shape_sample"]
+__all__ = ["Sample", "data_folder", "data_roots", "file_sample", "kept_sample", "load_sample", "mesh_sample",
+           "shape_mesh", "shape_sample"]
 
 SIDE = 1e-6  # distance from the end of a body, over its size, within which a node is on that side
 _CELLS = {"quad": (skfem.MeshQuad, "line"), "hexahedron": (skfem.MeshHex, "quad")}
@@ -40,6 +42,7 @@ class Sample:
     cells: numbers of the elements of each named set, ascending.
     notes: what was done to the mesh of a file while it was read, one line each.
     made: whether the mesh was made by gmsh, and is not a file of the user's or a committed one.
+    source: path of the file of the user's that it was read from first; "" for other meshes.
     """
 
     name: str
@@ -48,6 +51,7 @@ class Sample:
     made: bool = False
     cells: Mapping[str, np.ndarray] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    source: str = ""
 
     def nodes(self, boundary: str) -> np.ndarray:
         """Nodes of a named boundary.
@@ -125,6 +129,17 @@ def load_sample(case: str, mesh: str, make: Callable[[], meshio.Mesh] | None = N
     return _from_file(Path(mesh))
 
 
+def kept_sample(path: Path) -> Sample:
+    """The sample that a run has left in its folder.
+
+    Raises
+    ------
+    MeshError
+        As of :func:`load_sample`.
+    """
+    return _from_meshio(str(path), read_mesh_file(path))
+
+
 def file_sample(path: Path, merge_nodes: float = 0.0) -> Sample:
     """The sample in a mesh file, whose sides have names; nodes within `merge_nodes` [mm] of each other become one.
 
@@ -136,7 +151,7 @@ def file_sample(path: Path, merge_nodes: float = 0.0) -> Sample:
     MeshError
         As of :func:`load_sample`.
     """
-    sample = _from_file(path, merge_nodes)
+    sample = _from_file(path, merge_nodes, option=True)
     X = sample.space.X
     near = SIDE * float(np.ptp(X, axis=0).max())
     sides = {}
@@ -144,6 +159,11 @@ def file_sample(path: Path, merge_nodes: float = 0.0) -> Sample:
         for name, end in zip(names, (x.min(), x.max())):
             sides[name] = np.flatnonzero(np.abs(x - end) <= near)
     return replace(sample, boundaries={**sides, **sample.boundaries})
+
+
+def mesh_sample(name: str, mesh: meshio.Mesh) -> Sample:
+    """The sample of a mesh, whose boundaries and elements are those that it names (MeshError)."""
+    return _from_meshio(name, mesh)
 
 
 def shape_sample(case: str, own: Mapping[str, Any], lift: Callable[[meshio.Mesh], meshio.Mesh] | None = None,
@@ -193,14 +213,14 @@ def _as_it_is(mesh: meshio.Mesh) -> meshio.Mesh:
     return mesh
 
 
-def _from_file(path: Path, merge_nodes: float = 0.0) -> Sample:
-    """The sample in a mesh file, in one piece."""
+def _from_file(path: Path, merge_nodes: float = 0.0, option: bool = False) -> Sample:
+    """The sample in a mesh file, in one piece; `option` says that the scene has the parameter `merge_nodes`."""
     name = one_line(str(path))
     data = read_mesh_file(path)
     if merge_nodes:
         check_mesh(name, merged(name, data, merge_nodes))
-    sample = _from_meshio(str(path), data)
-    check_one_piece(sample.name, shlex.quote(name), sample.space)
+    sample = _from_meshio(str(path), data, source=str(path))
+    check_one_piece(sample.name, shlex.quote(name), sample.space, option)
     if len(nodes := hinges(sample.space)):
         what = "node" if sample.space.dim == 2 else "node or edge"
         note = (f"parts of the body hang together by a single {what}, at {len(nodes)} node(s), such as "
@@ -210,11 +230,18 @@ def _from_file(path: Path, merge_nodes: float = 0.0) -> Sample:
     return sample
 
 
-def _from_meshio(name: str, data: meshio.Mesh, made: bool = False) -> Sample:
-    shown = one_line(name)
-    present = [kind for kind in _CELLS if kind in data.cells_dict]
-    others = sorted({b.type for b in data.cells} - {"quad", "hexahedron", "line", "vertex"})
-    if others or not any(len(data.cells_dict[kind]) for kind in present):
+def _from_meshio(name: str, data: meshio.Mesh, made: bool = False, source: str = "") -> Sample:
+    shown, info = one_line(name), data.info or {}
+    types = {block.type for block in data.cells if len(block.data)}
+    present = [kind for kind in _CELLS if kind in types]
+    others = sorted(types - {"quad", "hexahedron", "line", "vertex"})
+    if needs_split(data):
+        raise MeshError(f"mesh {shown} has {counted(data)}, and a run takes quadrilaterals or hexahedra alone: "
+                        f"convert it with skfsink mesh {shlex.quote(shown)} OUT.vtu")
+    if others and present:
+        raise MeshError(f"mesh {shown} has {' and '.join(others)} cells beside its elements: leave them out, or let "
+                        f"skfsink mesh {shlex.quote(shown)} OUT.vtu do so")
+    if not present:
         raise MeshError(f"mesh {shown} must consist of quadrilaterals or hexahedra; it has "
                         f"{', '.join(sorted({b.type for b in data.cells})) or 'no cells'}")
     kind = "hexahedron" if "hexahedron" in present else "quad"
@@ -229,7 +256,8 @@ def _from_meshio(name: str, data: meshio.Mesh, made: bool = False) -> Sample:
         space = Space(mesh_class(np.ascontiguousarray(points.T), np.ascontiguousarray(connectivity.astype(np.int64))))
     except MeshError as error:
         raise MeshError(f"mesh {shown}: {error}") from None
-    return Sample(Path(name).stem, space, _boundaries(data, facet), made, _elements(data, kind), notes_of(data))
+    return Sample(info.get("name") or Path(name).stem, space, _boundaries(data, facet), info.get("made", made),
+                  _elements(data, kind), notes_of(data), info.get("source", source))
 
 
 def _elements(data: meshio.Mesh, kind: str) -> dict[str, np.ndarray]:
@@ -252,5 +280,5 @@ def _boundaries(data: meshio.Mesh, facet: str) -> dict[str, np.ndarray]:
         nodes = [block.data[index].ravel() for block, index in zip(data.cells, members)
                  if block.type == facet and index is not None and len(index)]
         if nodes:
-            sets[name] = np.unique(np.concatenate(nodes))
+            sets[name] = np.unique(np.concatenate([sets.get(name, nodes[0][:0]), *nodes]))
     return sets

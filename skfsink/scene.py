@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import os
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -15,6 +14,7 @@ import numpy as np
 import tomli_w
 
 from .density import SINKS
+from .digest import digest
 from .errors import OutputError, ParameterError, require
 from .explicit import ExplicitControls
 from .halving import Whole
@@ -27,6 +27,7 @@ from .regions import Region, check_lengths, divided
 from .sample import Sample
 from .statics import StaticsControls
 from .tables import joined, split
+from .text import read_toml
 
 __all__ = ["ANALYSES", "INTEGRATORS", "STARTS", "Controls", "Grip", "Scene", "choose", "read_choice",
            "read_parameters"]
@@ -175,6 +176,9 @@ class Scene:
         if self.controls.start == "rest" and (loading.knots or self.tractions):
             raise ParameterError("start rest is for grips of constant velocity; this scene has "
                                  f"{'tractions' if self.tractions else 'ramps'}: take start onset")
+        if self.controls.start == "rest" and loading.speed(0.0) == 0.0:
+            raise ParameterError("start rest needs a grip that moves; all of them are still: give one a velocity, or "
+                                 "take start onset")
 
     @property
     def parts(self) -> tuple[Region, ...]:
@@ -230,17 +234,24 @@ class Scene:
                 row[:] = [v.rate(0.0) if isinstance(v, Ramp) else v or 0.0 for v in grip.velocity]
         return float(np.linalg.norm(velocity[0] - velocity[1]))
 
-    def toml(self) -> str:
-        """Text of `scene.toml`."""
+    def toml(self, mesh: str = "") -> str:
+        """Text of `scene.toml`; `mesh` is the name of a file beside it that keeps the mesh of a file of the user's."""
         head = ("# A run of skfsink. Run it again with: skfsink run scene.toml\n"
                 "# Plain numbers are in N, mm, MPa and s; density in kg/m^3.\n")
         parameters = {k: v.item() if isinstance(v, np.generic) else v for k, v in self.parameters.items()}
+        source = {}
+        if mesh and self.sample.source:
+            parameters["mesh"], source = mesh, {"source": self.sample.source}
         choice = {"choice": dict(self.choice)} if self.choice else {}
-        return head + tomli_w.dumps({"case": self.case, **split(parameters), "assumed": list(self.assumed), **choice})
+        return head + tomli_w.dumps({"case": self.case, **source, **split(parameters), "assumed": list(self.assumed),
+                                     **choice})
 
     @property
     def fingerprint(self) -> str:
-        """Hash of all that decides the results of the run: parameters, loads, regions, and the mesh, wherever it is."""
+        """Hash of all that decides the results of the run, whatever the scene was made from, and wherever the mesh is.
+
+        It has two parts, the older one of which checkpoints of earlier versions have alone; see :mod:`.checkpoint`.
+        """
         text = replace(self, parameters={**self.parameters, "mesh": ""}, choice={}).toml()
         hashed, space = hashlib.sha256(text.encode()), self.sample.space
         for array in (space.X, space.conn, *(nodes for _, nodes in sorted(self.sample.boundaries.items()))):
@@ -248,11 +259,14 @@ class Scene:
         hashed.update(f"{self.grips} {self.rollers} {self.tractions}".encode())
         for region in self.regions:
             hashed.update(f"{region.name} {region.material} {region.sink_law}".encode() + region.elements.tobytes())
-        return hashed.hexdigest()
+        controls = replace(self.controls, checkpoint_every=Controls.checkpoint_every)  # a checkpoint changes nothing
+        rest = digest([controls, self.material, self.sink_law, self.regions, self.grips, self.rollers, self.tractions,
+                       self.faces, self.whole, self.sample.boundaries])
+        return f"{hashed.hexdigest()}-{rest}"
 
 
 def read_parameters(folder: Path, case: str) -> dict[str, Any]:
-    """Parameters in the `scene.toml` of a run.
+    """Parameters in the `scene.toml` of a run; a mesh file that it keeps is given by its path.
 
     Raises
     ------
@@ -263,15 +277,17 @@ def read_parameters(folder: Path, case: str) -> dict[str, Any]:
     if not path.is_file():
         raise OutputError(f"{folder} holds no run to resume: there is no {path}")
     try:
-        data = tomllib.loads(path.read_text())
+        data = read_toml(path)
         found, parameters = str(data["case"]), joined(data, case == "custom")
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, KeyError, TypeError, ValueError) as error:
+    except (OSError, KeyError, TypeError, ValueError) as error:
         raise OutputError(f"{path} is not the scene of a run: {error}") from None
     if found != case:
         raise OutputError(f"{folder} holds a run of case {found}, not of {case}")
+    if Path(mesh := str(parameters.get("mesh", ""))).suffix:
+        parameters["mesh"] = str((folder / mesh).absolute())
     return parameters
 
 
 def read_choice(folder: Path) -> dict[str, Any]:
     """The choice of a model in the `scene.toml` of a run; empty if there is none."""
-    return dict(tomllib.loads((folder / "scene.toml").read_text()).get("choice", {}))
+    return dict(read_toml(folder / "scene.toml").get("choice", {}))

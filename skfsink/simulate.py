@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from .checkpoint import load_checkpoint, save_checkpoint, save_state
+from .checks import warn
 from .density import DensitySolver
 from .direct import one_thread_of_openblas
 from .energy import Ledger
@@ -18,7 +19,9 @@ from .errors import CheckpointError, SkfsinkError
 from .explicit import Explicit
 from .guards import Notes
 from .hht import HHT
+from .history import history_units
 from .momentum import Momentum
+from .places import check_arrival, said
 from .progress import Display, Interrupt
 from .recorder import Recorder
 from .rest import LoadingFromRest
@@ -35,6 +38,9 @@ class Interrupted(SkfsinkError):
 
 class Simulation:
     """One run of a scene in a folder, resumable at any moment.
+
+    Memory: the whole run: `run` goes on from where it is; `unfailed`, `dissolved`, `cost` and `checkpoint` are of the
+    run so far.
 
     Parameters
     ----------
@@ -90,6 +96,7 @@ class Simulation:
             self._interrupt = interrupt
             if self.state.phase == "loading":
                 self.recorder.guard.check_scene()
+                warn(self.scene, self.folder)
                 if onset is None:
                     self._load()
                 else:
@@ -106,6 +113,7 @@ class Simulation:
                 else:
                     self._integrate()
                 self.state.phase = "done"
+                check_arrival(self.scene, self.recorder.tracker)
             self._lap("event")
             self.checkpoint()
             if interrupt.heeded():
@@ -136,7 +144,7 @@ class Simulation:
             started = True
             done = 0.5 * min(1.0, tolerance * state.grip / (loading.increment or np.inf)) ** 0.25
             self.display.update(done, f"grips {self.recorder.gauge.displacement(state):.4f} mm  load "
-                                      f"{self.recorder.load(reaction):.4f} N/mm  least γ {state.gamma.min():.3f}")
+                                      f"{self.recorder.load(reaction):.4f} {self._unit}  least γ {state.gamma.min():.3f}")
             self._pause("loading")
         self._lap("loading")
         if self.unfailed:
@@ -174,6 +182,7 @@ class Simulation:
             assert self.integrator is not None
             self.integrator.begin(state)
         self.recorder.start(state, reaction)
+        self.display.say(said(self.recorder.onset))
 
     def _make_integrator(self) -> None:
         c, threads = self.scene.controls, self.scene.controls.workers(self.scene.sample.space.dim)
@@ -182,8 +191,9 @@ class Simulation:
                                               c.deletion, threads)
             self.integrator = self._from_rest.integrator
         elif c.integrator == "explicit":
-            self.integrator = Explicit(self.momentum, self.density, self.free, self.loading, c.explicit,
-                                       c.deletion)
+            explicit = Explicit(self.momentum, self.density, self.free, self.loading, c.explicit, c.deletion)
+            self.recorder.guard.step_share = lambda: explicit.step_share(self.state)
+            self.integrator = explicit
         else:
             self.integrator = HHT(self.momentum, self.density, self.free, self.loading, c.hht, c.deletion,
                                   threads)
@@ -221,7 +231,8 @@ class Simulation:
             if recorder.watch(state, self.momentum.force(state.u), before, 0.0):
                 self._show(state, 0.0, f"sweep {state.step}")
             before = state.time
-            if self.dissolved or recorder.tracker.separated and (self.statics.settled or state.ledger.elastic < 1e-4 * scale):
+            at_rest = self.statics.settled or state.ledger.elastic < 1e-4 * scale
+            if self.dissolved or (recorder.tracker.separated and at_rest):
                 break
             self._pause("event")
         recorder.finish(state, self.momentum.force(state.u), 0.0)
@@ -231,8 +242,13 @@ class Simulation:
         size = float((self.scene.sample.space.X.max(axis=0) - self.scene.sample.space.X.min(axis=0)).max())
         load = self.recorder.history.rows[-1]["reaction_N_per_mm"]
         self.display.update(max(fraction, 0.9 * tips.length / size), (
-            f"{clock}  tip {tips.position[0]:.2f}, {tips.position[1]:.2f} mm ×{tips.branches}  load {load:.3f}  "
+            f"{clock}  tip {tips.position[0]:.2f}, {tips.position[1]:.2f} mm ×{tips.branches}  load {load:.3f} {self._unit}  "
             f"elastic {ledger.elastic:.4f} kinetic {ledger.kinetic:.4f} D {ledger.sink:.4f} U {ledger.paper:.4f}"))
+
+    @property
+    def _unit(self) -> str:
+        """Of the load."""
+        return history_units(self.scene.sample.space.dim)["reaction_N_per_mm"]
 
     # --- clocks and checkpoints ---
     def _lap(self, phase: str) -> None:
@@ -292,5 +308,6 @@ def onset_copy(state: State) -> State:
     """An independent copy of a loaded state, to start another analysis from."""
     return dataclasses.replace(
         state, u=state.u.copy(), v=state.v.copy(), a=state.a.copy(), gamma=state.gamma.copy(),
-        W_max=state.W_max.copy(), sink=None if state.sink is None else state.sink.copy(), deleted=state.deleted.copy(), deletions=list(state.deletions),
+        W_max=state.W_max.copy(), sink=None if state.sink is None else state.sink.copy(),
+        deleted=state.deleted.copy(), deletions=list(state.deletions),
         ledger=dataclasses.replace(state.ledger))

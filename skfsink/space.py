@@ -18,10 +18,10 @@ from functools import cached_property
 
 import numpy as np
 import skfem
-from numba import njit
 from scipy.sparse import coo_array, csr_array
 
 from .errors import MeshError
+from .jit import njit
 from .pattern import Pattern
 
 __all__ = ["Pattern", "Space"]

@@ -23,9 +23,9 @@ class State:
     sink: coefficients 1/(H + eps) that gamma was solved with, (ne, nq); None if gamma is to be solved anew.
     W_max: greatest stored energy each Gauss point has seen [MPa], (ne, nq); H follows from it (Eq. 10).
     deleted: failed elements, (ne,) bool.
-    deletions: the ordered log (time, element).
+    deletions: the ordered log (time, element), with `time` as below.
     grip: displacement of the grips along their velocity, as a time at that velocity [s] (the load clock).
-    time: time since the start of the phase [s].
+    time: time since the start of the phase [s]; in a quasi-static event the number of the sweep.
     step: steps taken in the phase (load increments, sweeps, time steps).
     phase: "loading", "event" or "done".
     ledger: energies of the phase.

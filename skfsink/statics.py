@@ -20,7 +20,11 @@ __all__ = ["Statics", "StaticsControls"]
 
 
 class Statics(StaticLoading):
-    """Equilibria of a body between grips: loading as of :class:`.StaticLoading`, then a crack through equilibria."""
+    """Equilibria of a body between grips: loading as of :class:`.StaticLoading`, then a crack through equilibria.
+
+    Memory: that of :class:`.StaticLoading`, and whether the last sweep `settled`; `propagate` goes on from there,
+    `memory` gives both.
+    """
 
     SNAP = 400  # Newton steps in a sweep: the body may snap to a shape far away
 
@@ -35,8 +39,8 @@ class Statics(StaticLoading):
         A sweep: equilibrium at fixed gamma (the energy it gives up is `released`), then the history, gamma and the
         deletions at fixed displacement (what they take is D). Grips and dead loads stand still while the crack runs;
         where it arrests, `settled` is set, and the next sweep moves them on by `advance` of their way so far. It ends
-        where the crack has not crossed at `limit` times the way of the start, or when nothing moves any more; `arrested`
-        then says which.
+        where the crack has not crossed at `limit` times the way of the start, or when nothing moves any more; then
+        `arrested` says which.
 
         Raises
         ------
@@ -145,9 +149,9 @@ class Statics(StaticLoading):
     # --- checkpoints ---
     def memory(self) -> dict[str, np.ndarray]:
         """What the analysis remembers beyond the state."""
-        return {"settled": np.array(self.settled), **super().memory()}
+        return {"settled": np.array(self.settled), "arrested": np.array(self.arrested), **super().memory()}
 
     def restore(self, memory: dict[str, np.ndarray]) -> None:
         """Take up what :meth:`memory` gave."""
-        self.settled = bool(memory["settled"])
+        self.settled, self.arrested = bool(memory["settled"]), str(memory["arrested"])
         super().restore(memory)

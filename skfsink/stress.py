@@ -19,7 +19,8 @@ def cauchy_stress(momentum: Momentum, u: np.ndarray) -> np.ndarray:
 
     sigma = P F^T / J with the P = gamma dW/dF (Eq. 11) that the force integrates: the volumetric part of the element
     "jbar" is gamma_bar k (J_bar - 1), one value an element. `u` is the displacement (n, dim); the relative density is
-    the one `momentum` has, which is 0 at points that exert no force.
+    the one `momentum` has, which is 0 at points that exert no force. It is NaN in elements that are crushed: where a
+    point that exerts a force has J below 0.02 or is inside out, which no stress is defined for.
     """
     space, gamma = momentum.space, momentum.gamma
     means = np.zeros((space.n_elements, 6))
@@ -40,7 +41,8 @@ def _at_points(momentum: Momentum, u: np.ndarray, part: Part, rows: slice, gamma
     F[...] = np.eye(3)
     F[..., :space.dim, :space.dim] += np.einsum("eai,eqaJ->eqiJ", u[space.conn[elements]], space.dN[elements])
     raw = _determinant(F)
-    F[raw < J_FLOOR] = np.eye(3)  # only points without stiffness get there
+    flat = raw < J_FLOOR
+    F[flat] = np.eye(3)  # as good as any for points without stiffness; those with it are marked as unknown
     if momentum.plane_stress:
         F = material.thin_sheet(F[..., :2, :2])
     J_bar = J = _determinant(F)
@@ -50,15 +52,18 @@ def _at_points(momentum: Momentum, u: np.ndarray, part: Part, rows: slice, gamma
         J_bar, gamma_bar = ((w * a).sum(axis=1, keepdims=True) / w.sum(axis=1, keepdims=True) for a in (raw, gamma))
     if isinstance(material, GeneralMaterial) and part.fibres is not None:
         tau = material.isochoric_stress(F, fibres=part.fibres[rows][:, None]) @ np.swapaxes(F, -1, -2)
-        return np.asarray((gamma / J)[..., None] * tau[..., _VOIGT[0], _VOIGT[1]]
-                          + (gamma_bar * k * (J_bar - 1))[..., None] * np.array([1.0, 1, 1, 0, 0, 0]))
-    b = F @ np.swapaxes(F, -1, -2)
-    trace = np.trace(b, axis1=-2, axis2=-1)
-    _, slope, _ = material.isochoric(J ** (-2 / 3) * trace)
-    shear = gamma * slope * J ** (-5 / 3)
-    mean = gamma_bar * k * (J_bar - 1) - 2 / 3 * shear * trace
-    return np.asarray(2 * shear[..., None] * b[..., _VOIGT[0], _VOIGT[1]]
-                      + mean[..., None] * np.array([1.0, 1, 1, 0, 0, 0]))
+        sigma = ((gamma / J)[..., None] * tau[..., _VOIGT[0], _VOIGT[1]]
+                 + (gamma_bar * k * (J_bar - 1))[..., None] * np.array([1.0, 1, 1, 0, 0, 0]))
+    else:
+        b = F @ np.swapaxes(F, -1, -2)
+        trace = np.trace(b, axis1=-2, axis2=-1)
+        _, slope, _ = material.isochoric(J ** (-2 / 3) * trace)
+        shear = gamma * slope * J ** (-5 / 3)
+        mean = gamma_bar * k * (J_bar - 1) - 2 / 3 * shear * trace
+        sigma = (2 * shear[..., None] * b[..., _VOIGT[0], _VOIGT[1]]
+                 + mean[..., None] * np.array([1.0, 1, 1, 0, 0, 0]))
+    sigma[flat & (gamma > 0)] = np.nan
+    return np.asarray(sigma)
 
 
 def _determinant(F: np.ndarray) -> np.ndarray:

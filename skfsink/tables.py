@@ -15,7 +15,7 @@ from typing import Any
 
 from .errors import ParameterError, require
 from .loads import Grip, Ramp, Traction
-from .material import LIMITERS, MATERIALS, Material, SinkLaw, material_of
+from .material import LIMITERS, MATERIALS, Material, SinkLaw, material_of, own_constants
 from .units import number_in
 
 __all__ = ["TABLES", "RegionLaw", "grip_from", "grips_of", "joined", "read_tables", "region_from", "split",
@@ -33,7 +33,7 @@ class RegionLaw:
     ----------
     name: of the set of elements in the mesh.
     material: name of the law.
-    constants: of the law, as text ("mu = 2 MPa"); those left out have their defaults.
+    constants: of the law, as text ("mu = 2 MPa", or "E = 3 MPa, nu = 0.499"); those left out have their defaults.
     phi: energy limiter Phi [MPa], > 0; 0 takes the one that belongs to the law.
     m: sharpness of the limiter, >= 1; 0 takes that of the body.
     bulk_modulus: bulk modulus k [MPa], > 0; 0 takes that of the body.
@@ -51,6 +51,8 @@ class RegionLaw:
     def laws(self, material: Material, sink_law: SinkLaw) -> tuple[Material, SinkLaw]:
         """Material and sink law of the region, in a body of these."""
         try:
+            if self.bulk_modulus:
+                _one_bulk_modulus(own_constants(self.material, self.constants)[1], self.bulk_modulus)
             law = material_of(self.material, self.constants, self.bulk_modulus or material.bulk_modulus,
                               self.density or material.density)
             phi = self.phi or LIMITERS[self.material].phi
@@ -118,7 +120,22 @@ def region_from(table: Any) -> RegionLaw:
         raise ParameterError(f"region {name}: material must be one of {', '.join(MATERIALS)}; got {law!r}")
     numbers: dict[str, Any] = {key: _number(f"region {name}, {key}", table[key], unit)
                                for key, unit in units.items() if key in table}
+    try:
+        text, bulk = own_constants(law, texts.get("constants", ""))
+        _one_bulk_modulus(bulk, numbers.get("bulk_modulus"))
+    except ParameterError as error:
+        raise ParameterError(f"region {name}: {error}") from None
+    if text:
+        texts["constants"] = text
+    if bulk is not None:
+        numbers["bulk_modulus"] = bulk
     return RegionLaw(name, **texts, **numbers)
+
+
+def _one_bulk_modulus(of_nu: float | None, given: float | None) -> None:
+    if of_nu is not None and given is not None:
+        raise ParameterError(f"bulk_modulus {given:g} MPa and the nu of the constants ({of_nu:.6g} MPa) say the same: "
+                             f"give one of them")
 
 
 def grips_of(grips: Sequence[Grip], dim: int) -> tuple[Grip, ...]:

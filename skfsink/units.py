@@ -1,4 +1,7 @@
-"""Quantities with units: what each parameter is measured in, and text such as "5 mm" as a number in that unit."""
+"""Quantities with units: what each parameter is measured in, and text such as "5 mm" as a number in that unit.
+
+Units are read as they are written: kg/m^3, kg/m**3, kg/m3, kg/m³, kg m^-3, kg·m⁻³, N/(mm^2).
+"""
 
 from __future__ import annotations
 
@@ -20,9 +23,19 @@ UNITS = {
     **dict.fromkeys(("event_time", "aftermath", "hht_dt", "record_every", "frame_every", "checkpoint_every"), "s"),
 }
 LONGEST = 80  # characters of a quantity
-#: a number, and units with one-digit powers between * and /
-QUANTITY = re.compile(r"\s*(?P<number>[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?)\s*"
-                      r"(?P<unit>([A-Za-zµ]+((\^|\*\*)-?\d)?(\s*[*/]\s*[A-Za-zµ]+((\^|\*\*)-?\d)?)*)?)\s*", re.ASCII)
+#: characters as they are typeset, and as they are typed
+TYPED = str.maketrans({"\u03bc": "µ", "−": "-", "–": "-", "·": "*", "⋅": "*", "×": "*", "°": "degree",
+                       **dict.fromkeys("\u00a0\u202f\u2009\u2007\ufeff", " ")})
+RAISED = re.compile("[⁰¹²³⁴⁵⁶⁷⁸⁹⁺⁻]+")  # superscripts
+PLAIN = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁺⁻", "0123456789+-")
+_POWER = r"(?:(?:\^|\*\*)?[+-]?\d)?"
+_UNIT = rf"[A-Za-zµ]+{_POWER}"
+_TERM = rf"(?:{_UNIT}|\(\s*{_UNIT}(?:(?:\s*[*/]\s*|\s+){_UNIT})*\s*\){_POWER})"
+#: a number, and units with one-digit powers between *, / and blanks
+QUANTITY = re.compile(rf"\s*(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{{1,3}})?)"
+                      rf"(?:\s*[*x]\s*10(?:\^|\*\*)(?P<ten>[+-]?\d{{1,2}}))?"
+                      rf"\s*(?P<unit>(?:{_TERM}(?:(?:\s*[*/]\s*|\s+){_TERM})*)?)\s*", re.ASCII)
+COMMA = re.compile(r"\s*[+-]?\d[\d.]*,\d")  # of a decimal number, or between thousands
 
 
 @cache
@@ -43,14 +56,18 @@ def in_unit(name: str, text: str, unit: str, plain: bool = False) -> float:
         It is no quantity, or one of another dimension; the message names the one expected.
     """
     wanted = f"a quantity in {unit}" if unit else "a pure number"
-    parts = QUANTITY.fullmatch(text) if len(text) <= LONGEST else None
+    typed = RAISED.sub(lambda found: f"^{found[0].translate(PLAIN)}", text[:LONGEST])
+    typed = typed.replace("°C", "degC").translate(TYPED)
+    parts = QUANTITY.fullmatch(typed) if len(text) <= LONGEST else None
     try:
-        if parts is None:
+        if COMMA.match(typed):
+            raise ValueError("decimals stand after a point, and nothing between thousands")
+        if parts is None or (parts["ten"] and "e" in parts["number"].lower()):
             raise ValueError
-        number = float(parts["number"])
+        number = float(parts["number"] + (f"e{parts['ten']}" if parts["ten"] else ""))
         if parts["unit"] == unit or (plain and not parts["unit"]):
             return number
-        return float(f"{number * _factor(parts['unit'], unit):.15g}")  # 5 µs are 5e-6 s, without a trace of the product
+        return float(f"{number * _factor(_written(parts['unit']), unit):.15g}")  # 5 µs are 5e-6 s, to the last digit
     except ValueError as error:
         raise ParameterError(f"{name} must be {wanted}, such as {_example(unit)}; got {text[:LONGEST]!r}"
                              + (f" ({error})" if str(error) else "")) from None
@@ -76,6 +93,18 @@ def _example(unit: str) -> str:
     return repr(f"1.5 {unit}".strip())
 
 
+def _written(unit: str) -> str:
+    """A unit with * for each product and ^ before each power.
+
+    A blank that follows a slash is refused: J/m s is J/(m s) to some and J s/m to others.
+    """
+    unit = re.sub(r"\s*([*/])\s*|(?<=\()\s+|\s+(?=\))", r"\1", unit.strip().replace("**", "^"))
+    unit = re.sub(r"(?<=[A-Za-zµ)])\^?(?=[+-]?\d)", "^", unit).replace("^+", "^")
+    if re.search(r"/[^()]*\s", re.sub(r"\([^()]*\)", "()", unit)):
+        raise ValueError(f"{unit!r} may be read in two ways: write brackets, as in N/(mm s)")
+    return re.sub(r"\s+|(?<=[\dA-Za-zµ)])(?=\()", "*", unit)
+
+
 @cache
 def _factor(text: str, unit: str) -> float:
     """How many of `unit` are one of `text`."""
@@ -89,4 +118,5 @@ def _factor(text: str, unit: str) -> float:
         if type(error).__name__ == "DimensionalityError":
             raise ValueError(f"its dimension is {found.dimensionality}, expected "
                              f"{registry.Unit(unit or 'dimensionless').dimensionality}") from None
-        raise ValueError(f"{text!r} is no unit") from None
+        case = f"; capitals count: {unit}" if text.lower() == unit.lower() else ""
+        raise ValueError(f"{text!r} is no unit{case}") from None

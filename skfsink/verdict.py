@@ -1,4 +1,4 @@
-"""What became of a run, in one line: cracked, arrested, still running, or not failed at all."""
+"""What became of a run, in one line: cracked, arrested, still running, failed everywhere, or not failed at all."""
 
 from __future__ import annotations
 
@@ -22,22 +22,24 @@ def verdict(scene: Scene, simulation: Simulation) -> str:
     if simulation.dissolved:
         return f"failed everywhere at once, {_when(scene, state.time)}: no place of it was weaker than another"
     cracked = np.isfinite(tracker.cracked_at)
+    even = simulation.recorder.guard.even
     quasistatic = scene.controls.analysis == "quasistatic"
     if not cracked.any():
-        if quasistatic:
-            return f"nothing cracked past the onset: {simulation.statics.arrested or 'the sweeps ended'}"
-        return (f"nothing cracked in the event_time of {event:g} s, least gamma {state.gamma.min():.3g}: the state past "
-                f"the onset has not run away yet")
+        why = ("the body is loaded evenly, and no place of it is weaker than another; its result is the greatest load"
+               if even else simulation.statics.arrested or "what has begun takes a longer event_time to run away")
+        when = "past the onset" if quasistatic else f"in the event_time of {event:g} s"
+        return f"nothing cracked {when}, least gamma {state.gamma.min():.3g}: {why}"
     if tracker.separated:
         first = "" if tracker.arrival is None else f", arrived first {_when(scene, tracker.arrival)}"
         return f"cracked and separated{first}; apart {_when(scene, simulation.recorder.separated_at)}"
-    tips = simulation.recorder.tips
+    last = simulation.recorder.history.rows[-1]
+    tip = at(np.array([last[f"tip_{x}_mm"] for x in "xyz"[:scene.sample.space.dim]]))
     if quasistatic and simulation.statics.arrested:
-        return f"arrested at {at(tips.position)}: {simulation.statics.arrested}"
-    if tips.active:
-        return f"the crack was still running at event_time = {event:g} s: its tip is at {at(tips.position)}"
+        return f"arrested at {tip}: {simulation.statics.arrested}"
+    if last["tips"]:
+        return f"the crack was still running at event_time = {event:g} s: its tip is at {tip}"
     arrived = "" if tracker.arrival is None else f" after it had arrived {_when(scene, tracker.arrival)}"
-    return f"arrested at {at(tips.position)}{arrived}: no tip has moved for 5 l/c_s at the end of the event"
+    return f"arrested at {tip}{arrived}: no tip has moved for 5 l/c_s at the end of the event"
 
 
 def greatest_ratio(density: DensitySolver, state: State) -> tuple[float, np.ndarray]:

@@ -17,11 +17,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from scipy.sparse import csr_array
 
 from .amg import AmgCG, residual
 from .direct import unsigned
+from .jit import njit
 
 __all__ = ["ActiveZone", "Zone"]
 
@@ -45,6 +45,8 @@ class ActiveZone:
     """Solves  A x = b  where the residual of the guess is, and checks the solution everywhere.
 
     Zones are handed in and out: which ones a solve finds is the caller's affair, and no solve depends on another.
+
+    Memory: counts and the `residual` of the last solve. `solve` depends on no earlier call.
 
     Parameters
     ----------

@@ -220,7 +220,7 @@ def test_files_of_both_analyses(mesh: Path, tmp_path: Path) -> None:
     status, err, _ = invoke("--mesh", mesh, "--out", out, "--analysis", "both", "--frame-every", "2e-5", *SMALL)
     assert (status, err) == (0, "")
     summary = json.loads((out / "summary.json").read_text())
-    assert (summary["schema"], summary["case"], summary["mesh"]) == (1, "single_edge_notch", "plate")
+    assert (summary["schema"], summary["case"], summary["mesh"]) == (2, "single_edge_notch", "plate")
     assert (out / "comparison.png").is_file() and (out / "scene.toml").is_file()
     for analysis in ("dynamic", "quasistatic"):
         part = summary[analysis]

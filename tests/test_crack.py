@@ -5,21 +5,21 @@ from __future__ import annotations
 import numpy as np
 from bodies import grid
 
-from skfsink.crack import CrackTracker
+from skfsink.crack import ADVANCES, CrackTracker, Plane
 from skfsink.space import Space
 
 L, CS = 0.1, 30.0  # length scale [mm], shear wave speed [m/s]
 H = 0.05           # element size [mm]
 
 
-def tracker(kind: str = "quad") -> tuple[CrackTracker, Space]:
+def tracker(kind: str = "quad", shear_wave_speed: float | None = CS) -> tuple[CrackTracker, Space]:
     """A plate of 2 x 1 mm (in space: one element thick), held at y = 0 and y = 1."""
     shape = (40, 20) if kind == "quad" else (40, 20, 1)
     space = Space(grid(kind, shape, (2.0, 1.0, 0.1)[:len(shape)]))
     X = space.X
     rim = np.flatnonzero((X[:, 0] < 1e-9) | (X[:, 0] > 2 - 1e-9) | (X[:, 1] < 1e-9) | (X[:, 1] > 1 - 1e-9))
     grips = [np.flatnonzero(X[:, 1] < 1e-9), np.flatnonzero(X[:, 1] > 1 - 1e-9)]
-    return CrackTracker(space, L, CS, grips, rim), space
+    return CrackTracker(space, L, shear_wave_speed, grips, rim), space
 
 
 def line(space: Space, x0: float, x1: float, y: float = 0.5) -> np.ndarray:
@@ -82,6 +82,20 @@ def test_branches_and_tip_speed() -> None:
     assert track.look(41e-6, forked).branches == 2
 
 
+def test_a_clock_of_sweeps_is_no_time() -> None:
+    """Fails if ages in sweeps are compared with seconds, or a speed is made of sweeps."""
+    track, space = tracker(shear_wave_speed=None)
+    for sweep in range(1, 6):
+        gamma = line(space, 0, 0.1 * sweep)
+        track.mark(float(sweep), gamma)
+        tips = track.look(float(sweep), gamma)
+        assert (tips.active, tips.speed) == (1, 0.0)
+    assert track.look(5.0 + ADVANCES - 1, gamma).active == 1
+    arrested = track.look(5.0 + ADVANCES, gamma)
+    assert (arrested.active, arrested.branches) == (0, 1)
+    assert track.mean_speed() is None
+
+
 def test_leading_tip_is_kept_where_it_forks() -> None:
     """Fails if the tip is taken for roughness as long as the arms of a fresh fork are short, and an old arm leads."""
     track, space = tracker()
@@ -97,3 +111,30 @@ def test_leading_tip_is_kept_where_it_forks() -> None:
         tips = track.look(time, gamma)
     np.testing.assert_allclose(tips.position, (1.3, 0.65))
     assert tips.branches == 2  # the old arm and the new tip; the shorter arm of the fork may yet be roughness
+
+
+def test_a_plane_of_symmetry_is_no_edge_but_a_mirror() -> None:
+    """Fails if a crack along a plane of symmetry does not arrive, or one across it waits for an edge of the image.
+
+    The plane is y = 0: a crack along it arrives at x = 2. The plane is x = 0: a crack from it to x = 2 joins that edge
+    to its image, one from x = 0 to half of the width does not, and neither does one from x = 2 that stops before it.
+    """
+    _, space = tracker()
+    X = space.X
+    left, right, low, high = (X[:, 0] < 1e-9, X[:, 0] > 2 - 1e-9, X[:, 1] < 1e-9, X[:, 1] > 1 - 1e-9)
+
+    def cut_along(axis: int, plane: np.ndarray, others: np.ndarray) -> CrackTracker:
+        return CrackTracker(space, L, CS, [np.flatnonzero(low), np.flatnonzero(high)], np.flatnonzero(others),
+                            [Plane(axis, np.flatnonzero(plane))])
+
+    along = cut_along(1, low & (X[:, 0] > 0.5), left | right | high | (low & (X[:, 0] < 0.51)))
+    assert not along.mark(1e-6, line(space, 0.5, 1.95, 0.0))
+    assert along.mark(2e-6, line(space, 0.5, 2.0, 0.0))
+    across = cut_along(0, left, right | low | high)
+    assert not across.mark(1e-6, line(space, 0.0, 1.0))
+    assert across.mark(2e-6, line(space, 0.0, 2.0))
+    inwards = cut_along(0, left, right | low | high)
+    assert not inwards.mark(1e-6, line(space, 0.05, 2.0))
+    assert inwards.mark(2e-6, line(space, 0.0, 2.0))
+    corner = cut_along(0, left, right | low | high)  # a place that is on the plane is its own image
+    assert not corner.mark(1e-6, line(space, 0.0, 2.0, 0.0))

@@ -20,11 +20,19 @@ from skfsink.errors import MeshError, ParameterError, SkfsinkError
 from skfsink.loader import load
 from skfsink.loading import Loading
 from skfsink.loads import Grip, Ramp, Traction
-from skfsink.material import LIMITERS, MATERIALS, Gent, HolzapfelGasserOgden, constants_text, read_constants
+from skfsink.material import (
+    LIMITERS,
+    MATERIALS,
+    Gent,
+    HolzapfelGasserOgden,
+    constants_text,
+    own_constants,
+    read_constants,
+)
 from skfsink.meshing import write_mesh
 from skfsink.options import Options
 from skfsink.sample import file_sample
-from skfsink.tables import RegionLaw, grip_from, joined, read_tables, split
+from skfsink.tables import RegionLaw, grip_from, joined, read_tables, region_from, split
 
 HEAD = 'case = "custom"\n[parameters]\nmesh = "plate.vtu"\nlength_scale = 0.6\nevent_time = "5 µs"\n'
 GRIPS = '[[grips]]\nboundary = "top"\nx = 0\ny = "1 µm/s"\n[[grips]]\nboundary = "bottom"\nx = 0\ny = -1e-3\n'
@@ -95,7 +103,7 @@ def test_constants_with_units_and_vectors() -> None:
 
 
 @pytest.mark.parametrize(("law", "text", "said"), [
-    ("gent", "mu", "name = value pairs between commas, of mu, limit for gent"), ("gent", "nu = 1", "got 'nu = 1'"),
+    ("gent", "mu", "name = value pairs between commas, of mu, limit for gent"), ("gent", "eta = 1", "got 'eta = 1'"),
     ("gent", "mu = 1 mm", "mu must be a quantity in MPa"), ("gent", "mu = 1, mu = 2", "mu is there twice"),
     ("gent", "bulk_modulus = 5", "of mu, limit"), ("yeoh", "c1 = x", "c1 must be")])
 def test_what_are_no_constants(law: str, text: str, said: str) -> None:
@@ -103,6 +111,90 @@ def test_what_are_no_constants(law: str, text: str, said: str) -> None:
     with pytest.raises(ParameterError) as error:
         Options(material=law, constants=text)
     assert said in str(error.value)
+
+
+# --- E, G and nu ---
+@pytest.mark.parametrize(("law", "besides"), [
+    ("aaa", "c2 = 2 MPa"), ("neo-hookean", ""), ("yeoh", "c2 = 0.1"), ("mooney-rivlin", "c2 = 10 kPa"),
+    ("gent", "limit = 50"), ("arruda-boyce", "segments = 5")])
+def test_engineering_constants(law: str, besides: str) -> None:
+    """Fails if E, G or nu do not come out of the tangent modulus of the undeformed solid."""
+    E, nu = 1.2, 0.45
+    G, k = E / (2 * (1 + nu)), E / (3 * (1 - 2 * nu))
+    for text in (f"E = {E} N/mm², nu = {nu}", f"nu = {nu}, G = {G * 1e3!r} kPa"):
+        found = MATERIALS[law](**read_constants(law, ", ".join(filter(None, [text, besides]))))
+        assert found.shear_modulus == pytest.approx(G, rel=1e-12)
+        assert found.bulk_modulus == pytest.approx(k, rel=1e-12)
+        A = found.modulus(np.eye(3))  # of the undeformed solid: stress of a uniaxial strain, then free sides
+        side = A[1, 1, 0, 0] / (A[1, 1, 1, 1] + A[1, 1, 2, 2])
+        assert side == pytest.approx(nu, rel=1e-9)
+        assert A[0, 0, 0, 0] - 2 * side * A[0, 0, 1, 1] == pytest.approx(E, rel=1e-9)
+    assert read_constants(law, f"G = 1, {besides}").keys() & {"bulk_modulus"} == set()
+    text, bulk = own_constants(law, f"E = {E} MPa, nu = {nu}, {besides}")
+    assert MATERIALS[law](**read_constants(law, text), bulk_modulus=bulk or 0) == MATERIALS[law](
+        **read_constants(law, f"E = {E} MPa, nu = {nu}, {besides}"))
+    if besides:
+        assert own_constants(law, besides) == (besides, None)
+
+
+@pytest.mark.parametrize(("law", "text", "said"), [
+    ("gent", "E = 1, nu = 0.5", "nu must be in (-1, 0.5); got 0.5: nu = 0.5 is incompressible: give nu = 0.4999, or"),
+    ("gent", "E = 1, nu = -1", "nu must be in (-1, 0.5); got -1"), ("gent", "E = 1, nu = 0.7", "got 0.7"),
+    ("gent", "E = 1 MPa", "give nu as well"), ("gent", "E = -1, nu = 0.3", "E must be"),
+    ("gent", "E = 1, G = 1, nu = 0.3", "E and G of gent say the same"),
+    ("gent", "mu = 1, G = 1", "G and mu of gent say the same"), ("gent", "E = 1 mm, nu = 0.3", "quantity in MPa"),
+    ("mooney-rivlin", "E = 1, nu = 0.4", "give c2 as well"), ("hgo", "E = 1, nu = 0.4", "hgo has fibres"),
+    ("mooney-rivlin", "G = 0.1, nu = 0.4, c2 = 1", "would be -0.95 MPa"), ("gent", "E = 1, E = 1", "E is there twice"),
+    ("yeoh", "c1 = 1, E = 1, nu = 0.3", "E and c1 of yeoh"), ("gent", "mu = 0,27 MPa", "decimals stand after a point"),
+    ("aaa", "E = 1", "give nu as well"), ("aaa", "c1 = 1", "c1 and c2, or E, G and nu")])
+def test_engineering_constants_that_do_not_fit(law: str, text: str, said: str) -> None:
+    """Fails if moduli that contradict each other, or leave something open, are taken."""
+    with pytest.raises(ParameterError) as error:
+        Options(material=law, constants=text)
+    assert said in str(error.value) and "\n" not in str(error.value)
+
+
+def test_a_deck_with_engineering_constants_is_stored_in_those_of_the_law(folder: Path) -> None:
+    """Fails if scene.toml leaves open what was computed, if E and nu are another run than mu and k, or are no run."""
+    region = '[[regions]]\nname = "stiff"\nmaterial = "yeoh"\nconstants = "E = 3 N/mm^2, nu = 0.49"\nphi = 1\n'
+    mesh = plate()
+    middle = mesh.points[mesh.cells_dict["quad"]].mean(axis=1)
+    mesh.cell_sets["stiff"] = [np.flatnonzero(middle[:, 0] > 3), np.zeros(0, int)]
+    write_mesh(folder / "plate.vtu", mesh)
+    text = HEAD + 'material = "neo-hookean"\nconstants = "E = 3.6 MPa, nu = 0.49"\n' + GRIPS + region
+    assert invoke_program("run", deck(folder, text), "--out", "first", "--quiet")[0] == 0
+    written = tomllib.loads((folder / "first" / "scene.toml").read_text())
+    G = 3.6 / 2.98
+    assert read_constants("neo-hookean", written["parameters"]["constants"]) == {"mu": pytest.approx(G)}
+    assert written["parameters"]["bulk_modulus"] == pytest.approx(3.6 / 0.06)
+    assert written["regions"][0]["bulk_modulus"] == pytest.approx(50) and "E" not in written["regions"][0]["constants"]
+    assert invoke_program("run", "first/scene.toml", "--out", "second", "--quiet")[0] == 0
+    assert invoke_program("resume", "first", "--quiet")[0] == 0
+    for name in ("history.csv", "scene.toml"):
+        assert (folder / "second" / name).read_bytes() == (folder / "first" / name).read_bytes()
+
+
+@pytest.mark.parametrize(("options", "said"), [
+    ({"bulk_modulus": 400.0}, "say the same"), ({"given": frozenset({"bulk_modulus"})}, "say the same")])
+def test_two_bulk_moduli_are_refused(options: dict[str, Any], said: str) -> None:
+    """Fails if one of two bulk moduli is taken without a word, even where the other is the default."""
+    with pytest.raises(ParameterError, match=said):
+        Options(material="gent", constants="mu = 1, nu = 0.49", **options)
+    with pytest.raises(ParameterError, match=said):
+        RegionLaw("r", "gent", "mu = 1, nu = 0.49", bulk_modulus=1.0).laws(Gent(), Options().sink_law())
+    with pytest.raises(ParameterError, match="region r: bulk_modulus 1 MPa and the nu"):
+        region_from({"name": "r", "material": "gent", "constants": "nu = 0.4", "bulk_modulus": "1 MPa"})
+
+
+def test_engineering_constants_of_aaa() -> None:
+    """Fails if E, G and nu of the paper's law go past its options c1, c2, or contradict them without a word."""
+    of = Options(constants="nu = 0.49", c1=1.0).stored_energy()
+    assert of.bulk_modulus == pytest.approx(2 * 2.0 * 1.49 / (3 * 0.02)) and of.shear_modulus == 2.0
+    of = Options(constants="G = 3 MPa", c2=0.5)
+    assert of.parameters()["c1"] == 1.5 and of.parameters()["constants"] == "" and of.parameters()["c2"] == 0.5
+    assert Options(**of.parameters()).stored_energy() == of.stored_energy()
+    with pytest.raises(ParameterError, match=r"c1 1\.0 MPa and the G of the constants say the same"):
+        Options(constants="G = 3 MPa", c1=1.0)
 
 
 @pytest.mark.parametrize(("options", "said"), [

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,9 @@ from plates import invoke, invoke_program, plate
 from skfsink.commands.show import deck_text
 from skfsink.deck import CASES, parameters_of, read_deck, stored_case
 from skfsink.errors import OutputError, ParameterError, SkfsinkError
+from skfsink.loader import load
 from skfsink.meshing import write_mesh
+from skfsink.scene import read_parameters
 from skfsink.units import UNITS, in_unit
 
 REFERENCES = sorted((Path(__file__).resolve().parents[1] / "cases").glob("*/reference/*/scene.toml"))
@@ -36,7 +39,18 @@ def parameters(folder: Path, text: str, case: str = "single_edge_notch") -> dict
 @pytest.mark.parametrize(("text", "unit", "value"), [
     ("5 mm", "mm", 5), ("5mm", "mm", 5), ("0.5 cm", "mm", 5), ("-2e-3 m", "mm", -2), ("60 µm/min", "mm/s", 1e-3),
     ("1.433 g/cm^3", "kg/m^3", 1433), ("0.1686 N/mm^2", "MPa", 0.1686), ("168.6 kPa", "MPa", 0.1686),
-    ("10", "", 10), ("150 µs", "s", 1.5e-4)])
+    ("10", "", 10), ("150 µs", "s", 1.5e-4),
+    # as people write them
+    ("1433 kg/m3", "kg/m^3", 1433), ("1433 kg/m³", "kg/m^3", 1433), ("1433 kg m^-3", "kg/m^3", 1433),
+    ("1433 kg m-3", "kg/m^3", 1433), ("1433 kg·m⁻³", "kg/m^3", 1433), ("1433 kg⋅m⁻³", "kg/m^3", 1433),
+    ("1433 kg m**-3", "kg/m^3", 1433), ("1433 kg*m^-3", "kg/m^3", 1433), ("1.433e-9 t/mm^3", "kg/m^3", 1433),
+    ("1.433×10⁻⁹ t/mm³", "kg/m^3", 1433), ("1.433 x 10^-9 t/mm3", "kg/m^3", 1433), ("1.433 g/cm3", "kg/m^3", 1433),
+    ("1.433·10⁻⁹ t·mm⁻³", "kg/m^3", 1433), ("0.1686 N/mm2", "MPa", 0.1686), ("0.1686 N/mm²", "MPa", 0.1686),
+    ("0.1686 N mm⁻²", "MPa", 0.1686), ("0.1686 N/(mm²)", "MPa", 0.1686), ("2 kN/mm2", "MPa", 2000),
+    ("2e6 kg/(m s2)", "MPa", 2), ("2e6 kg/(m·s²)", "MPa", 2), ("2e6 kg/m/s2", "MPa", 2), ("5 MN/m²", "MPa", 5),
+    ("5 µs", "s", 5e-6), ("5 \u03bcs", "s", 5e-6), ("5 \u00b5m", "mm", 5e-3), ("3 mm s^-1", "mm/s", 3),
+    ("3 mm·s⁻¹", "mm/s", 3), ("3 mm s-1", "mm/s", 3), ("3 mm / s", "mm/s", 3), ("3\u00a0mm/s", "mm/s", 3),
+    ("3\tmm/s", "mm/s", 3), ("3\u202fmm", "mm", 3), ("−3 mm", "mm", -3), ("50°", "degree", 50), ("+5 mm", "mm", 5)])
 def test_quantities(text: str, unit: str, value: float) -> None:
     """Fails if a unit is converted wrongly."""
     assert in_unit("x", text, unit) == pytest.approx(value, rel=1e-12)
@@ -46,6 +60,10 @@ def test_quantities(text: str, unit: str, value: float) -> None:
     ("5 kg", "mm", "expected [length]"), ("5", "mm", "quantity in mm"), ("10 mm", "", "pure number"),
     ("5 bananas", "mm", "'bananas' is no unit"), ("mm", "mm", "'1.5 mm'"), ("nan mm", "mm", "nan"),
     ("5 mm^99", "mm", "'5 mm^99'"), ("1e9999 mm", "mm", "1e9999"), ("5 mm; import os", "mm", "import"),
+    ("1,5 mm", "mm", "decimals stand after a point"), ("1.000,5 mm", "mm", "decimals"), ("-1,000 mm", "mm", "decimals"),
+    ("1,5", "", "decimals"), ("1 J/m s", "MPa", "may be read in two ways"), ("5 m2", "mm", "[length] ** 2"),
+    ("5 mm²", "mm", "[length] ** 2"), ("5 Mpa", "MPa", "capitals count: MPa"), ("1e3x10^3 mm", "mm", "1e3x10^3"),
+    ("5 N-mm", "mm", "N-mm"), ("1 (m", "mm", "1 (m"), ("5 mm ^2", "mm", "5 mm ^2"), ("5 °C", "mm", "expected [length]"),
     ("5 degC", "mm", "expected [length]"), ("9" * 500, "mm", "99")])
 def test_what_is_no_quantity(text: str, unit: str, said: str) -> None:
     """Fails if a mistake of dimension passes, or the message does not say what is expected."""
@@ -131,6 +149,63 @@ def test_no_run_to_resume(tmp_path: Path) -> None:
     (tmp_path / "scene.toml").write_text('case = "../../etc"\n')
     with pytest.raises(OutputError, match="its case is"):
         stored_case(tmp_path)
+
+
+# --- files of other programs ---
+TEXT = 'case = "single_edge_notch"\n\n[parameters]\nside = "5 mm"\t# größe\nmesh = "plate.vtu"\n'
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le-bom", "utf-16-be-bom", "utf-32"])
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+def test_encodings_and_line_ends(encoding: str, end: str, tmp_path: Path) -> None:
+    """Fails if a deck that an editor of Windows has saved is not read as it is meant, or a stored scene is not."""
+    content = TEXT.replace("\n", end).encode(encoding.removesuffix("-bom"))
+    mark = {"utf-16-le-bom": b"\xff\xfe", "utf-16-be-bom": b"\xfe\xff"}.get(encoding, b"")
+    for name in ("deck.toml", "scene.toml"):
+        (tmp_path / name).write_bytes(mark + content)
+    assert read_deck(tmp_path / "deck.toml").parameters == {"side": 5.0, "mesh": str(tmp_path / "plate.vtu")}
+    assert stored_case(tmp_path) == "single_edge_notch" == load(tmp_path).case
+    assert read_parameters(tmp_path, "single_edge_notch")["side"] == "5 mm"
+
+
+@pytest.mark.parametrize(("content", "said"), [
+    (TEXT.encode("latin-1"), "line 4 has a character that is no UTF-8 (byte 0xf6): save the file as UTF-8"),
+    (TEXT.encode("utf-16-le"), "UTF-16 without a byte order mark: save it as UTF-8"),
+    (TEXT.encode("utf-16-be"), "UTF-16 without a byte order mark: save it as UTF-8"),
+    (TEXT.encode("utf-16")[:-1], "save the file as UTF-8")])
+def test_what_is_no_text(content: bytes, said: str, tmp_path: Path) -> None:
+    """Fails if a file in another encoding is refused without its cure."""
+    (tmp_path / "deck.toml").write_bytes(content)
+    with pytest.raises(ParameterError) as error:
+        read_deck(tmp_path / "deck.toml")
+    assert said in str(error.value) and "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(("line", "said"), [
+    (r'mesh = "..\dir\mesh.inp"', r"for \ in a path write /, or put the path in single quotes"),
+    *((line, r"for \ in a path write /") for line in (
+        r'mesh = "..\test\mesh.inp"', r'mesh = "C:\Users\me\m.inp"', r'mesh = "..\new\mesh.inp"',
+        r'mesh = "..\bodies\mesh.inp"')),
+    ("side = 1,5", "decimals stand after a point"), ('side = "1,5 mm"', "decimals stand after a point"),
+    ("side = 5 mm", 'text stands in quotes, as in "5 mm"'), ("mesh = M3", "text stands in quotes"),
+    ("mesh = “M3”", "write straight quotes"), ('side: "5 mm"', "write = between name and value"),
+    ("mesh = ../a.inp", "text stands in quotes")])
+def test_usual_mistakes_have_their_cure(line: str, said: str, tmp_path: Path) -> None:
+    """Fails if a mistake that people make in decks is refused without saying what to write instead."""
+    with pytest.raises(ParameterError) as error:
+        parameters(tmp_path, line)
+    assert said in str(error.value) and "\n" not in str(error.value) and "deck.toml" in str(error.value)
+
+
+@pytest.mark.skipif(os.sep != "/", reason="a path of this system")
+def test_a_path_of_windows(tmp_path: Path) -> None:
+    """Fails if a path with backslashes is refused here without its cure."""
+    (tmp_path / "dir").mkdir()
+    write_mesh(tmp_path / "dir" / "plate.vtu", plate())
+    for path in (r"dir\plate.vtu", r"C:\Users\me\plate.vtu"):
+        name = deck(tmp_path, f"case = 'single_edge_notch'\n[parameters]\nmesh = '{path}'\n")
+        status, err, _ = invoke_program("run", name, "--out", tmp_path / "out", "--quiet")
+        assert status == 2 and err.count("\n") == 1 and "folders are parted by / here, not by \\" in err, err
 
 
 # --- hostile ---

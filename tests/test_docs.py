@@ -7,6 +7,7 @@ import importlib.util
 import re
 import shlex
 from collections.abc import Iterator
+from dataclasses import asdict
 from pathlib import Path
 from types import ModuleType
 
@@ -20,6 +21,7 @@ from skfsink.cli import command
 from skfsink.deck import CASES, case_function, parameters_of
 from skfsink.meshing import write_mesh
 from skfsink.options import Options
+from skfsink.statics import Statics, StaticsControls
 from skfsink.sweep.vary import read_variation
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -163,6 +165,39 @@ def test_warnings_and_failures_have_a_row() -> None:
                 found += list(templates(call.args[0]))[:1]
     missing = [text for text in found if not any(agree(row, ELSEWHERE.get(text, text)) for row in QUOTED)]
     assert len(found) > 30 and missing == []
+
+
+# --- options and numbers ---
+def test_defaults_in_the_table_of_options_are_those_of_the_program() -> None:
+    """Fails if the table says another default than the program has."""
+    defaults, found = asdict(Options()), 0
+    for line in PAGES["docs/methods.md"].partition("## 7. Options")[2].partition("\n## ")[0].splitlines():
+        if line.startswith("| `"):
+            names, default, *_ = (cell.strip() for cell in line.strip("|").split("|"))
+            for name, said in zip(re.findall(r"`(\w+)`", names), default.split(", ")):
+                value = defaults.get(name)  # another table has the parameters of the samples
+                if isinstance(value, bool):
+                    assert said == ("on" if value else "off"), name
+                elif isinstance(value, float | int):
+                    assert float(said.replace("−", "-")) == value, name
+                elif isinstance(value, str):
+                    assert said.replace("–", "") == value, name
+                found += name in defaults
+    assert found > 30
+
+
+def test_numbers_of_the_loading_are_those_of_the_program() -> None:
+    """Fails if the page of methods gives other limits of Newton's method than the program has."""
+    controls = StaticsControls()
+    said = re.search(r"\*\*Limits\.\*\* (\d+) steps for each equilibrium.* at most (\d+) passes.*?; (\d+)\s+in a sweep",
+                     PAGES["docs/methods.md"], re.DOTALL)
+    assert said and [int(n) for n in said.groups()] == [controls.max_newton, controls.max_passes, Statics.SNAP]
+
+
+def test_the_example_of_a_case_calls_what_there_is() -> None:
+    """Fails if the case in CONTRIBUTING calls what is no method of the options."""
+    called = re.findall(r"\boptions\.(\w+)\(", PAGES["CONTRIBUTING.md"])
+    assert len(called) >= 4 and all(callable(getattr(Options(), name)) for name in called), called
 
 
 # --- pages ---

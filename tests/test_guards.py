@@ -12,6 +12,7 @@ import pytest
 import skfem
 from guarded import SHARP, Watched, scene
 
+from skfsink.energy import Ledger
 from skfsink.errors import InstabilityError
 from skfsink.explicit import ExplicitControls
 from skfsink.guards import Notes
@@ -260,3 +261,12 @@ def test_cure_is_that_of_the_method(controls: dict[str, Any], cure: str):
     failed(30)(watched)
     with pytest.raises(InstabilityError, match=cure):
         watched.guard.check_step(watched.state)
+
+
+def test_a_ledger_without_an_onset_energy_is_held_against_what_it_is_about():
+    """Fails if the error of a ledger is none as long as there is no onset energy, whatever does not close."""
+    ledger = Ledger(elastic=2.0, work=3.0)
+    assert ledger.error(4.0) == 0.25 and ledger.error(0.0) == pytest.approx(1 / 3) and ledger.scale(0.0) == 3.0
+    assert ledger.error(np.nan) == ledger.error(0.0)
+    assert Ledger().error(0.0) == 0.0 and Ledger(paper=1.0).error(0.0) == 0.0
+    assert not Ledger(elastic=np.nan).error(0.0) <= 0.05

@@ -6,6 +6,7 @@ import importlib
 import inspect
 import json
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -17,8 +18,11 @@ from references import scene_of
 import skfsink.run
 from skfsink import models
 from skfsink.cases.single_edge_notch import _scene, single_edge_notch
+from skfsink.crack import CRACKED
+from skfsink.density import DensitySolver
 from skfsink.errors import MeshError, OutputError, ParameterError
 from skfsink.halving import Mirror, Whole, cut
+from skfsink.hht import HHTControls
 from skfsink.material import AAA
 from skfsink.meshing import write_mesh
 from skfsink.models import LADDERS, REFERENCE, Ladder, choose_model, rung
@@ -26,9 +30,10 @@ from skfsink.momentum import Momentum
 from skfsink.options import QUANTITIES, Options
 from skfsink.progress import Display
 from skfsink.quantities import relative_error
+from skfsink.rest import LoadingFromRest
 from skfsink.run import read_scene
 from skfsink.sample import _from_meshio, data_folder
-from skfsink.scene import Scene
+from skfsink.scene import Grip, Scene
 from skfsink.simulate import Interrupted, Simulation
 from skfsink.sweeping import swept
 
@@ -189,6 +194,30 @@ def test_a_start_from_rest_comes_to_the_static_onset_in_motion(tmp_path: Path) -
     assert found["rest"] == pytest.approx(found["onset"], rel=2e-3)
     with pytest.raises(ParameterError, match="start rest is for analysis dynamic"):
         Options(start="rest", analysis="both")
+
+
+def test_a_fast_start_from_rest_ends_when_the_sample_has_come_apart(tmp_path: Path) -> None:
+    """Fails if the loading by fast grips goes on past the first crack, for ever: it tore the sample long before."""
+    scene = small(tmp_path, "rest")
+    scene = replace(scene, grips=(Grip("top", (0.0, 5000.0)), Grip("bottom", (0.0, 0.0))),
+                    controls=replace(scene.controls, event_time=2e-4))
+    simulation = Simulation(scene, tmp_path, Display(quiet=True))
+    state = simulation.run()
+    loading = [row for row in simulation.recorder.history.rows if row["phase"] == "loading"]
+    assert min(row["gamma_min"] for row in loading[:-1]) > CRACKED
+    assert simulation.recorder.tracker.separated and state.phase == "done"
+    assert simulation.recorder.gauge.displacement(state) < 3.0
+
+
+def test_a_start_from_rest_needs_a_grip_that_moves(tmp_path: Path) -> None:
+    """Fails if still grips end in a division by zero."""
+    scene = small(tmp_path, "rest")
+    with pytest.raises(ParameterError, match="start rest needs a grip that moves; all of them are still"):
+        replace(scene, grips=(Grip("top", (0.0, 0.0)), Grip("bottom", (0.0, 0.0))))
+    space = scene.sample.space
+    with pytest.raises(ParameterError, match="start rest needs a grip that moves"):
+        LoadingFromRest(Momentum(space, AAA()), DensitySolver(space, scene.sink_law),
+                        scene.constraints()[0], np.zeros_like(space.X), HHTControls())
 
 
 # --- the ladder ---

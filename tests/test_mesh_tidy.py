@@ -15,7 +15,7 @@ from skfsink.mesh_file import read_mesh_file
 from skfsink.mesh_files.pieces import hinges, merged
 from skfsink.mesh_files.tidy import base_of, tidied
 from skfsink.meshing import write_mesh
-from skfsink.sample import Sample, file_sample
+from skfsink.sample import Sample, file_sample, load_sample
 
 
 def sample_of(folder: Path, mesh: meshio.Mesh) -> Sample:
@@ -187,6 +187,13 @@ def test_pieces_are_refused(parts: list[tuple[int, int, tuple[float, float]]], s
     assert [part for part in said if part not in str(error.value)] == []
 
 
+def test_pieces_in_a_case_of_the_paper(tmp_path: Path) -> None:
+    """Fails if the line names an option that the case has not."""
+    write_mesh(tmp_path / "parts.vtu", beside(grid(2, 3), grid(2, 3, (1, 0))))
+    with pytest.raises(MeshError, match="within 1e-6 mm: mend the file with skfsink mesh "):
+        load_sample("single_edge_notch", str(tmp_path / "parts.vtu"))
+
+
 def test_merged_pieces_are_the_whole(tmp_path: Path) -> None:
     """Fails if merging leaves a node twice, loses one of a boundary, or does not say where."""
     sample = sample_of(tmp_path, grid(4, 3))
@@ -234,17 +241,36 @@ def test_merging_along_a_chain(tmp_path: Path) -> None:
         merged("chain", mesh, 0.4)
 
 
-def test_a_slit_is_not_closed_in_silence() -> None:
-    """Fails if the faces of a slit are merged without a word of it."""
+def slit() -> meshio.Mesh:
+    """A square of 4 x 4 elements, with the coinciding faces of a slit at y = 1 for x up to 1."""
     mesh = beside(grid(4, 2), grid(4, 2, (0, 1)))
     nodes = np.flatnonzero(np.isclose(mesh.points[:, 1], 1) & (mesh.points[:, 0] > 1))
     one, two = nodes[:len(nodes) // 2], nodes[len(nodes) // 2:]
     for block in mesh.cells:  # grown together for x > 1
         block.data = np.where(np.isin(block.data, two), one[np.searchsorted(two, block.data).clip(max=len(one) - 1)],
                               block.data)
-    tidied(mesh)
-    notes = merged("slit", mesh, 1e-6).info["notes"]
+    return tidied(mesh)
+
+
+def test_a_slit_is_not_closed_in_silence() -> None:
+    """Fails if the faces of a slit are merged without a word of it."""
+    notes = merged("slit", slit(), 1e-6).info["notes"]
     assert notes[-1].startswith("3 of the merged node(s) joined a piece to itself, between (0, 1) and (1, 1) mm")
+
+
+def test_the_faces_of_a_slit_join_no_pieces(tmp_path: Path) -> None:
+    """Fails if nodes that coincide within a piece are counted as a cure."""
+    parts = slit(), grid(1, 1, (7, 7))
+    for part in parts:
+        part.cell_sets = {}
+    write_mesh(tmp_path / "slit.vtu", beside(*parts))
+    with pytest.raises(MeshError, match="and no nodes of theirs coincide"):
+        file_sample(tmp_path / "slit.vtu")
+    mesh = slit()
+    mesh.info = None
+    write_mesh(tmp_path / "slit.vtu", mesh)
+    sample = file_sample(tmp_path / "slit.vtu")  # and a slit is no piece, and no hinge
+    assert sample.notes == () and sample.space.n_nodes == 28
 
 
 def test_hinges(tmp_path: Path) -> None:

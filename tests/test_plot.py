@@ -104,14 +104,30 @@ def test_the_picture_does_not_show_where_spent_nodes_are(plate: Space, tmp_path:
     assert (tmp_path / "calm.png").read_bytes() == (tmp_path / "wild.png").read_bytes()
 
 
-def test_torn_elements_are_not_drawn(plate: Space) -> None:
-    u = np.zeros_like(plate.X)
-    u[plate.conn[100, 0]] = [7.0, 0.0]  # a live node far away
-    frame = Frame(0.0, "", u, np.ones(plate.n_nodes), np.zeros(plate.n_elements, bool))
+@pytest.mark.parametrize("stretch", [1.0, 6.0])
+def test_torn_elements_are_not_drawn(plate: Space, stretch: float) -> None:
+    """Fails if an element that spans a crack is drawn as a streak, or one that is stretched as all others is not."""
+    u, gamma = (stretch - 1) * plate.X * [0, 1], np.ones(plate.n_nodes)
+    u[plate.conn[100, 0]] += [40.0, 0.0]  # a cracked node far away that is not spent
+    gamma[plate.conn[100, 0]], gamma[plate.conn[400]] = 0.05, 0.05
+    frame = Frame(0.0, "", u, gamma, np.zeros(plate.n_elements, bool))
     elements, x = deformed.live_elements(plate, frame)
     torn = (plate.conn == plate.conn[100, 0]).any(axis=1)
     np.testing.assert_array_equal(elements, np.flatnonzero(~torn))
-    assert on_plate(x)
+    assert on_plate(x / [1, stretch])
+
+
+def test_what_has_not_cracked_is_drawn_however_far_it_is_stretched(kind: str) -> None:
+    """Fails if a stretch alone, uniform or next to a stiffer part, makes a hole in an intact body."""
+    space = Space(grid(kind, (6, 6, 2)[:2 if kind == "quad" else 3]))
+    still = np.ones(space.n_nodes), np.zeros(space.n_elements, bool)
+    along = space.X[:, 1]
+    for place in (6 * along, np.where(along < 0.5, along, 0.5 + 20 * (along - 0.5))):
+        u = np.zeros_like(space.X)
+        u[:, 1] = place - along
+        elements, x = deformed.live_elements(space, Frame(0.0, "", u, *still))
+        np.testing.assert_array_equal(elements, np.arange(space.n_elements))
+        np.testing.assert_allclose(x, (space.X + u)[space.conn])
 
 
 def test_the_body_ends_where_gamma_falls_below_a_tenth() -> None:

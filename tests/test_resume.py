@@ -19,8 +19,10 @@ from plates import SMALL, contents, figures, forked, invoke, plate
 
 import skfsink.checkpoint
 import skfsink.run
+from skfsink.kept_mesh import keep_mesh
 from skfsink.meshing import write_mesh
 from skfsink.output import History
+from skfsink.sample import load_sample
 
 RUNS = {"explicit": [], "short": ["--event-time", "3e-5"], "quasistatic": ["--analysis", "quasistatic"],
         "consistent": ["--sink", "consistent", "--event-time", "4e-5"],
@@ -191,6 +193,14 @@ def other_mesh(top: Path) -> None:
     mesh = plate()
     mesh.points[30, 0] += 1e-9
     write_mesh(top / "plate.vtu", mesh)
+    keep_mesh(load_sample("single_edge_notch", str(top / "plate.vtu")), top / "run/mesh.npz")
+
+
+def older(top: Path) -> None:
+    """A folder as earlier versions left it, which name the mesh file, and keep no mesh."""
+    edit(top / "run/scene.toml", 'mesh = "mesh.npz"', f'mesh = "{top / "plate.vtu"}"')
+    (top / "run/mesh.npz").unlink()
+    (top / "plate.vtu").unlink()
 
 
 SPOILT: dict[str, tuple[Callable[[Path], object], str]] = {
@@ -213,7 +223,10 @@ SPOILT: dict[str, tuple[Callable[[Path], object], str]] = {
     "text": (lambda top: edit(top / "run/scene.toml", "side = 4.0", 'side = "wide"'), "'wide'"),
     "list": (lambda top: edit(top / "run/scene.toml", "phi = 0.1686", "phi = [1, 2]"), "(0, inf) MPa"),
     "other mesh": (other_mesh, "another scene"),
-    "no mesh": (lambda top: (top / "plate.vtu").unlink(), "no mesh file"),
+    "no mesh": (lambda top: (top / "run/mesh.npz").unlink(), "no mesh file"),
+    "cut mesh": (lambda top: cut(top / "run/mesh.npz", 0.7), "mesh.npz cannot be read"),
+    "foreign mesh": (lambda top: np.savez(top / "run/mesh.npz", u=np.ones(3)), "mesh.npz cannot be read"),
+    "old mesh file": (older, "no mesh file"),
     "no series": (lambda top: shutil.rmtree(top / "run/series"), "run.pvd"),
     "no frame": (lambda top: (top / "run/series/run_0000.vtu").unlink(), "of the 2 frames"),
     "cut pvd": (lambda top: cut(top / "run/series/run.pvd", 0.5), "run.pvd"),

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import inspect
+import os
+import subprocess
+import sys
 import tomllib
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +17,17 @@ from plates import SMALL, invoke, plate
 
 import skfsink.run
 from skfsink.cases.single_edge_notch import _scene, single_edge_notch
-from skfsink.errors import MeshError, OutputError, ParameterError, require
+from skfsink.checkpoint import load_state, save_state
+from skfsink.digest import digest
+from skfsink.errors import CheckpointError, MeshError, OutputError, ParameterError, require
+from skfsink.halving import Whole
+from skfsink.loads import Ramp
+from skfsink.material import NeoHookean, SinkLaw
 from skfsink.meshing import write_mesh
 from skfsink.options import Options
+from skfsink.regions import Region
 from skfsink.scene import Grip, Scene, read_parameters
+from skfsink.state import State
 
 OWN = {name: p.default for name, p in inspect.signature(single_edge_notch).parameters.items() if name != "options"}
 
@@ -46,6 +56,8 @@ def test_scene_file_is_enough_to_run_again(arguments: list[str], mesh: Path, tmp
     assert parameters.keys() == OWN.keys() | Options().parameters().keys()
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path / "elsewhere")
+    assert parameters["mesh"] == "mesh.npz"  # beside it
+    parameters["mesh"] = str(tmp_path / "first" / "mesh.npz")
     options = {name: value for name, value in parameters.items() if name not in OWN}
     result = single_edge_notch(**{name: parameters[name] for name in OWN},
                                options=Options(**options, out=Path("second"), quiet=True))
@@ -82,6 +94,75 @@ def test_fingerprint_tells_scenes_apart(mesh: Path, tmp_path: Path) -> None:
     assert len(marks) == 1 + len(others) + len(bodies) + 1
     (tmp_path / "copy").mkdir()
     assert scene(Path(mesh.rename(tmp_path / "copy" / "moved.vtu"))).fingerprint == base.fingerprint
+
+
+class Stiffer(NeoHookean):
+    """A material of one's own that its parameters do not tell from another."""
+
+    @property
+    def constants(self) -> np.ndarray:
+        return 2 * np.array([self.mu])
+
+
+@dataclass(frozen=True)
+class Patchy(NeoHookean):
+    """One with a long array."""
+
+    map: Any = None
+
+
+def test_fingerprint_of_scenes_made_in_python(mesh: Path) -> None:
+    """Fails if a checkpoint could be resumed under other physics that no parameter of the scene tells."""
+    base = scene(mesh)
+    long = np.zeros(5000)
+    long[2500] = 1.0
+    hurried = replace(base.controls, statics=replace(base.controls.statics, increment=0.02))
+    others = [
+        *(replace(base, material=one) for one in (NeoHookean(), NeoHookean(mu=1.3), Stiffer(), Patchy())),
+         replace(base, material=Patchy(map=long)),
+        replace(base, material=Patchy(map=0 * long)),
+        replace(base, sink_law=SinkLaw(phi=0.17)), replace(base, sink_law=SinkLaw(epsilon=1e-14)),
+        replace(base, controls=replace(base.controls, overshoot=0.006)), replace(base, controls=hurried),
+        replace(base, controls=replace(base.controls, frame_every=1e-5)),
+        replace(base, controls=replace(base.controls, explicit=replace(base.controls.explicit, estimate_every=7))),
+        replace(base, controls=replace(base.controls, threads=2)),
+        replace(base, rollers=(Grip("left", (0.0, None)),)), replace(base, faces=("left",)),
+        replace(base, whole=Whole(2.0)),
+        replace(base, grips=(Grip("top", (0.0, Ramp(tuple(np.arange(2000.0)), tuple(long[:2000])))),)),
+        replace(base, sample=replace(base.sample, boundaries={"lid" if name == "notch" else name: nodes for name, nodes
+                                                              in base.sample.boundaries.items()})),
+        replace(base, regions=(Region("r", np.arange(3), Patchy(map=long), base.sink_law),)),
+        replace(base, regions=(Region("r", np.arange(3), Patchy(map=2 * long), base.sink_law),))]
+    assert len({s.fingerprint for s in (base, *others)}) == 1 + len(others)
+    same = [replace(base, controls=replace(base.controls, checkpoint_every=1.0)), replace(base, title="Other"),
+            replace(base, material=replace(base.material, bulk_modulus=500)), replace(base, view=(0.0, 0.0))]
+    assert base.material.compiled_law  # is kept from here on
+    assert {s.fingerprint for s in (base, *same)} == {base.fingerprint}
+
+
+def test_digests_do_not_depend_on_the_process() -> None:
+    """Fails if the hash of a value has an address, the order of a set, or the elided text of an array in it."""
+    code = ("from skfsink.digest import digest; from skfsink.options import Options; o = Options(material='hgo');"
+            "print(digest([o.stored_energy(), o.sink_law(), o.controls(), {'a', 'b', 'c'}]))")
+    ran = [subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True,
+                          env={**os.environ, "PYTHONHASHSEED": seed}).stdout for seed in "12"]
+    assert ran[0] == ran[1]
+    assert digest([1, 2.0, True]) == digest((1.0, np.float64(2), 1)) != digest([1, 2])
+    assert digest({"a": 1, "b": 2}) == digest({"b": 2, "a": 1}) != digest({"a": 2, "b": 1})
+    values = ("1", 1, b"1", None, "", 2**60, 2**60 + 1, 0.1, [0.1], {0.1}, np.array([0.1]))
+    assert len({digest(value) for value in values}) == len(values)
+
+
+def test_a_checkpoint_of_an_earlier_version_is_known(mesh: Path, tmp_path: Path) -> None:
+    """Fails if a run begun before the fingerprint had its second part cannot go on, or one of another scene can."""
+    base, other = scene(mesh), scene(mesh, phi=0.2)
+    state = State.intact(base.sample.space)
+    save_state(tmp_path / "old.npz", base.fingerprint.partition("-")[0], state)
+    assert load_state(tmp_path / "old.npz", base.fingerprint).step == 0
+    for path, of in (("old.npz", other), ("new.npz", replace(base, material=NeoHookean()))):
+        save_state(tmp_path / "new.npz", base.fingerprint, state)
+        with pytest.raises(CheckpointError, match="another scene"):
+            load_state(tmp_path / path, of.fingerprint)
 
 
 def test_parts_are_the_scenes_of_single_runs(mesh: Path) -> None:

@@ -39,6 +39,26 @@ def test_stress_at_the_points_gives_the_nodal_forces(space: Space, kind: str, el
         assert np.abs(s[..., 2]).max() < 1e-9 * np.abs(s).max()
 
 
+@pytest.mark.parametrize("element", ["jbar", "plain", "planestress"])
+def test_the_stress_of_crushed_elements_is_unknown(kind: str, element: str) -> None:
+    """Fails if a crushed point that bears a force is given a stress, as of F = I, or a dead one makes it unknown."""
+    if kind == "hex" and element == "planestress":
+        pytest.skip("for quadrilaterals only")
+    space = box(kind, 3)
+    momentum, x = Momentum(space, AAA(), element), space.X.copy()
+    gamma = np.ones(space.n_nodes)
+    gamma[space.conn[0]] = 0.0
+    low, high = space.conn[0], space.conn[-1]
+    for conn in (low, high):  # folded through its middle
+        x[conn] = x[conn].mean(axis=0) - [0.5, *[-1.0] * (space.dim - 1)] * (x[conn] - x[conn].mean(axis=0))
+    momentum.set_gamma(gamma, np.zeros(space.n_elements, bool))
+    found = stress.cauchy_stress(momentum, x - space.X)
+    assert np.isnan(found[-1]).all() and not found[0].any()
+    intact = ~np.isin(space.conn, [*low, *high]).any(axis=1)
+    assert np.isfinite(found[intact]).all()
+    assert np.isnan(stress.pressure(found)[-1]) and np.isnan(stress.von_mises(found)[-1])
+
+
 def test_means_chunks_and_invariants(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if the chunks are put together wrongly, or a homogeneous stress is not that of the material."""
     space = box(kind, 3)

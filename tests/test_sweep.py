@@ -6,6 +6,7 @@ import contextlib
 import csv
 import json
 import os
+import shutil
 import subprocess
 import sys
 import time
@@ -18,12 +19,15 @@ import pytest
 from PIL import Image
 from plates import invoke_program, plate
 
+import skfsink.run
+import skfsink.sweep.plan
 from skfsink.deck import parameters_of, read_deck
 from skfsink.errors import OutputError, ParameterError
+from skfsink.history import History
 from skfsink.meshing import write_mesh
 from skfsink.sweep.one import run_folder
 from skfsink.sweep.plan import run_sweep
-from skfsink.sweep.table import draw, write_parquet
+from skfsink.sweep.table import draw, read_rows, read_units, write_csv, write_parquet
 from skfsink.sweep.vary import combinations, read_variation
 
 KNOWN = parameters_of("single_edge_notch")
@@ -127,7 +131,7 @@ def test_picture_of_an_ensemble(tmp_path: Path) -> None:
     rows = [{"notch": notch, "mesh_seed": seed, "analysis": "dynamic", "U": random.normal(0.1, 0.01), "D": 0.04,
              "tip_speed": None if seed == 2 else 26.0, "branches": seed} for notch in (1.0, 2.0) for seed in (1, 2, 3)]
     for varied in (["notch", "mesh_seed"], ["mesh_seed"], ["sink"]):
-        draw([{**row, "sink": "lumped"} for row in rows], varied, tmp_path / "sweep.png")
+        draw([{**row, "sink": "lumped"} for row in rows], varied, tmp_path / "sweep.png", read_units([]))
         assert (tmp_path / "sweep.png").stat().st_size > 10_000
 
 
@@ -135,9 +139,34 @@ def test_parquet_has_the_same_table(tmp_path: Path) -> None:
     """Fails if a column, its unit or a missing figure is lost."""
     parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed (the sweep extra)")
     rows = [{"phi": 0.1, "U": 0.2, "failure": None}, {"phi": 0.2, "U": None, "failure": "why"}]
-    write_parquet(rows, tmp_path / "sweep.parquet")
+    write_parquet(rows, tmp_path / "sweep.parquet", read_units([]))
     assert parquet.read_table(tmp_path / "sweep.parquet").to_pylist() == [
         {"phi": 0.1, "U [N mm/mm]": 0.2, "failure": None}, {"phi": 0.2, "U [N mm/mm]": None, "failure": "why"}]
+
+
+def test_units_are_those_of_the_bodies(tmp_path: Path) -> None:
+    """Fails if the load on a body in space is told in N/mm, by the table or by a summary without units, or a sweep over
+    both kinds does not say which unit is whose."""
+    folders = []
+    for name, dim, schema in (("old", 3, 1), ("new", 3, 2), ("plane", 2, 2)):
+        folders.append(tmp_path / name)
+        run = folders[-1] / "run"
+        run.mkdir(parents=True)
+        History(run / "history.csv", dim=dim)
+        load, energy = ("N", "N mm") if dim == 3 else ("N/mm", "N mm/mm")
+        key = "reaction_N" if (dim, schema) == (3, 2) else "reaction_N_per_mm"
+        summary = {"case": "x", "analysis": "dynamic", "onset": {key: 7.0}, "energy": {"U_paper_at_arrival": 1.0}}
+        if schema == 2:
+            summary["units"] = {"load": load, "energy": energy}
+        (run / "summary.json").write_text(json.dumps(summary))
+    for some, load, energy in ((folders[:1], "N", "N mm"), (folders[:2], "N", "N mm"), (folders[2:], "N/mm", "N mm/mm"),
+                               (folders, "N/mm, in space N", "N mm/mm, in space N mm")):
+        rows, units = read_rows(some, [{"seed": 1}] * len(some)), read_units(some)
+        write_csv(rows, tmp_path / "sweep.csv", units)
+        header = (tmp_path / "sweep.csv").read_text().splitlines()[0]
+        assert next(csv.reader([header]))[2:6] == ["onset_displacement [mm]", f"onset_load [{load}]", f"U [{energy}]",
+                                                   f"D [{energy}]"]
+        assert [row["onset_load"] for row in rows] == [7.0] * len(some)
 
 
 def test_two_processes_in_one_folder(deck: Path, tmp_path: Path) -> None:
@@ -224,6 +253,39 @@ def test_a_worker_that_is_killed_loses_nothing_and_repeats_nothing(
     assert starts(out).count("resumed") == 1
 
 
+def test_a_sweep_goes_on_elsewhere(deck: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fails if a sweep that was moved is taken for another one, needs the mesh of begun runs, or takes another mesh."""
+    monkeypatch.setattr(skfsink.run, "draw_run", lambda *_: None)
+    here, far = tmp_path / "here", tmp_path / "far"
+    here.mkdir(), far.mkdir()
+    for name in ("plate.vtu", "scene.toml"):
+        shutil.move(tmp_path / name, here / name)
+    monkeypatch.setattr(skfsink.sweep.plan, "here", lambda folders, jobs: (folder for folder in ()))
+    run_sweep(here / "scene.toml", ["phi=0.15,0.16"], here / "sweep", quiet=True)
+    run_folder(here / "sweep" / "phi=0.15")
+    first = (here / "sweep" / "phi=0.15" / "run" / "history.csv").read_bytes()
+    (here / "sweep" / "phi=0.15" / "run" / "summary.json").unlink()  # it has its last pictures to draw
+    shutil.copytree(here / "sweep", far / "sweep")
+    for name in ("plate.vtu", "scene.toml"):
+        shutil.move(here / name, far / name)
+    run_sweep(far / "scene.toml", ["phi=0.15,0.16"], far / "sweep", quiet=True)
+    for name in ("phi=0.15", "phi=0.16"):
+        run_folder(far / "sweep" / name)
+        assert not (far / "sweep" / name / "failure.txt").exists()
+    assert (far / "sweep" / "phi=0.15" / "run" / "history.csv").read_bytes() == first
+    assert starts(far / "sweep") == ["begun", "begun", "resumed"]
+    mesh = plate()
+    mesh.points[30, 0] += 1e-9
+    write_mesh(far / "plate.vtu", mesh)
+    shutil.move(far / "plate.vtu", tmp_path / "plate.vtu")
+    shutil.move(far / "scene.toml", tmp_path / "scene.toml")
+    with pytest.raises(OutputError, match=r"holds a run on another mesh than .*plate\.vtu; choose another --out"):
+        run_sweep(tmp_path / "scene.toml", ["phi=0.15,0.16"], far / "sweep", quiet=True)
+    (tmp_path / "scene.toml").write_text((tmp_path / "scene.toml").read_text().replace("2 µs", "3 µs"))
+    with pytest.raises(OutputError, match="another sweep"):
+        run_sweep(tmp_path / "scene.toml", ["phi=0.15,0.16"], far / "sweep", quiet=True)
+
+
 # --- the ensemble that is shipped ---
 ENSEMBLE = Path(__file__).resolve().parents[1] / "cases" / "single_edge_notch" / "ensemble"
 
@@ -250,7 +312,7 @@ def test_an_ensemble_is_drawn_against_its_seeds(tmp_path: Path, monkeypatch: pyt
     monkeypatch.setattr("matplotlib.axes.Axes.axhspan", lambda _, low, high, **__: drawn.append((low, high)))
     rows = [{"mesh_seed": i, "analysis": "dynamic", "U": 1.0 + i, "D": 1.0, "tip_speed": 2.0, "branches": i}
             for i in range(3)]
-    draw(rows, ["mesh_seed"], tmp_path / "sweep.png")
+    draw(rows, ["mesh_seed"], tmp_path / "sweep.png", read_units([]))
     assert drawn[0] == pytest.approx((1.0, 3.0)) and len(drawn) == 4
     assert (tmp_path / "sweep.png").stat().st_size > 10_000
 

@@ -123,6 +123,22 @@ def test_hht_gives_up_with_a_reason(fracture: Fracture):
     assert state.step == 0 and hht.rejected == 1
 
 
+def test_hht_halves_a_step_whose_density_does_not_converge(fracture: Fracture, monkeypatch: pytest.MonkeyPatch):
+    """Fails if the density solver's failure in a trial ends the run, and is not taken as a step that is too long."""
+    fresh, momentum, density, free, velocity = fracture
+    state, solve = fresh(), density.solve
+    hht = HHT(momentum, density, free, velocity, HHTControls(dt=1e-7))
+    hht.begin(state)
+
+    def fails(W_max: np.ndarray, gamma: np.ndarray) -> np.ndarray:
+        if hht.dt > 4e-8:
+            raise ConvergenceError("the relative density left (0, 1]")
+        return solve(W_max, gamma)
+    monkeypatch.setattr(density, "solve", fails)
+    hht.step(state)
+    assert hht.rejected == 2 and state.time == pytest.approx(2.5e-8)
+
+
 @pytest.mark.parametrize("mass", ["lumped", pytest.param("consistent", marks=pytest.mark.xfail(
     strict=True, reason="the consistent mass has no floor: nodes leap by millimetres, the ledger misses up to 0.2"))])
 def test_nodes_that_lost_their_mass_stay_near_the_body(fracture: Fracture, mass: str):

@@ -11,6 +11,7 @@ from pathlib import Path
 from docstring_parser import parse
 
 from skfsink.deck import case_function
+from skfsink.history import onset_load
 from skfsink.loader import Run, load
 from skfsink.sample import data_folder
 from skfsink.units import UNITS
@@ -74,7 +75,7 @@ def _row(run: Run) -> str:
     else:
         arrival, motion = f"{time * 1e6:.0f} µs", f"{speed:.1f}"
     return (f"| {run.folder.name} | {s['elements']:,} | {onset['displacement_mm']:.3f} | "
-            f"{onset['reaction_N_per_mm']:.3g} | {energy['U_paper_at_arrival']:#.2g} | "
+            f"{onset_load(onset):.3g} | {energy['U_paper_at_arrival']:#.2g} | "
             f"{energy['D_sink_at_arrival']:#.2g} | {arrival} | {motion} | {event['max_branches']} |")
 
 

@@ -16,8 +16,8 @@ stored d xi/d X. Each function below is one pass over the lanes of a tile and ve
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ..jit import njit
 from .lanes import FAST, GAUSS_HIGH, GAUSS_LOW, J_FLOOR, LANES, guess_inverse_cbrt, refine_inverse_cbrt
 
 # Rows of the workspace and of the geometry, four Gauss points each: a quantity at Gauss point q of lane i is at

@@ -9,8 +9,8 @@ four lines of Gauss points; the nodal force is the transpose of that.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ..jit import njit
 from .force2d import _add, _dilatation_plain, least_live
 from .lanes import FAST, GAUSS_HIGH, GAUSS_LOW, J_FLOOR, guess_inverse_cbrt, refine_inverse_cbrt
 from .lanes import LANES_3D as LANES

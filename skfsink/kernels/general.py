@@ -13,8 +13,8 @@ each element, three rows for each family, tiled.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ..jit import njit
 from . import force2d, force3d
 from .lanes import FAST, LANES, LANES_3D, guess_inverse_cbrt, refine_inverse_cbrt
 

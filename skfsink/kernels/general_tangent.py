@@ -14,8 +14,8 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from ..jit import njit
 from ..material import GeneralMaterial
 from ..pattern import Pattern
 from ..space import Space

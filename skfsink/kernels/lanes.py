@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from ..jit import njit
 
 LANES = 32             #: quadrilaterals in a tile
 LANES_3D = 16          #: hexahedra in a tile; their working set is eight times as large

@@ -16,8 +16,8 @@ condensed out. gamma multiplies all of it and drops out of P_33 = 0.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ..jit import njit
 from ..material import Material
 from ..pattern import Pattern
 from ..space import Space

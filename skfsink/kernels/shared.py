@@ -5,8 +5,7 @@
 
 from __future__ import annotations
 
-from numba import njit, prange
-
+from ..jit import njit, prange
 from .force2d import force_2d
 from .force3d import force_3d
 from .general import force_general_2d, force_general_3d

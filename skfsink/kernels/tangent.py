@@ -20,8 +20,8 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from ..jit import njit
 from ..material import Material
 from ..space import Pattern, Space
 from .lanes import J_FLOOR

@@ -8,8 +8,8 @@ the passes of the force loops are used again.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ..jit import njit
 from . import force2d, force3d
 from .lanes import FAST, LANES, LANES_3D
 

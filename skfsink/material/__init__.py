@@ -11,13 +11,14 @@ Units: N, mm, MPa, tonne, s. Density is entered in kg/m^3 and held in t/mm^3.
 
 from .base import Material
 from .compiled import GENERAL_LAW, LAW, CompiledLaw
-from .constants import constants_text, material_of, read_constants
+from .constants import MODULI, constant_names, constants_text, material_of, own_constants, read_constants
 from .fibres import HolzapfelGasserOgden
 from .general import GeneralMaterial, MooneyRivlin
 from .isotropic import AAA, ArrudaBoyce, Gent, NeoHookean, Yeoh
 from .library import LIMITERS, MATERIALS, Limiter, material_from
 from .sink import SinkLaw
 
-__all__ = ["AAA", "GENERAL_LAW", "LAW", "LIMITERS", "MATERIALS", "ArrudaBoyce", "CompiledLaw", "GeneralMaterial",
-           "Gent", "HolzapfelGasserOgden", "Limiter", "Material", "MooneyRivlin", "NeoHookean", "SinkLaw", "Yeoh",
-           "constants_text", "material_from", "material_of", "read_constants"]
+__all__ = ["AAA", "GENERAL_LAW", "LAW", "LIMITERS", "MATERIALS", "MODULI", "ArrudaBoyce", "CompiledLaw",
+           "GeneralMaterial", "Gent", "HolzapfelGasserOgden", "Limiter", "Material", "MooneyRivlin", "NeoHookean",
+           "SinkLaw", "Yeoh", "constant_names", "constants_text", "material_from", "material_of", "own_constants",
+           "read_constants"]

@@ -1,19 +1,32 @@
-"""The constants of a law as text with units, "mu = 0.27 MPa, limit = 76.5", and the law with them."""
+"""The constants of a law as text with units, "mu = 0.27 MPa, limit = 76.5", and the law with them.
+
+In place of a law's own stiffness there may be Young's modulus `E` or the shear modulus `G` of the undeformed material,
+and Poisson's ratio `nu` in place of the bulk modulus: k = 2 G (1 + nu)/(3 (1 - 2 nu)), G = E/(2 (1 + nu)).
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
 
-from ..errors import ParameterError
+from ..errors import ParameterError, require
 from ..units import in_unit
 from .base import Material
 from .library import MATERIALS, material_from
 
-__all__ = ["constant_unit", "constants_text", "material_of", "read_constants"]
+__all__ = ["MODULI", "constant_names", "constant_unit", "constants_text", "material_of", "own_constants",
+           "read_constants"]
 
 COMMON = tuple(field.name for field in fields(Material))  # bulk_modulus and density have parameters of their own
-_MPA, _PURE = ("mu", "c", "c1", "c2", "c3", "k1"), ("limit", "segments", "k2", "kappa")
+_MPA, _PURE = ("mu", "c", "c1", "c2", "c3", "k1", "E", "G"), ("limit", "segments", "k2", "kappa", "nu")
+MODULI = ("E", "G", "nu")
+#: the constant that the shear modulus of the undeformed material determines, and how; the rest are the other constants
+FROM_SHEAR = {
+    "aaa": ("c1", lambda G, rest: G / 2), "neo-hookean": ("mu", lambda G, rest: G),
+    "yeoh": ("c1", lambda G, rest: G / 2), "mooney-rivlin": ("c1", lambda G, rest: G / 2 - rest["c2"]),
+    "gent": ("mu", lambda G, rest: G),
+    "arruda-boyce": ("mu", lambda G, rest: G * (rest["segments"] - 1) / (rest["segments"] - 1 / 3))}
 
 
 def constant_unit(name: str) -> str:
@@ -24,25 +37,87 @@ def constant_unit(name: str) -> str:
 def read_constants(law: str, text: str) -> dict[str, Any]:
     """Constants of a law from text: name = value pairs between commas; the numbers of a vector have blanks between.
 
+    E or G become the constant of the law that they determine, and nu becomes `bulk_modulus`.
+
     Raises
     ------
     ParameterError
-        The law has no such constant, it is there twice, or its value is no quantity in its unit.
+        The law has no such constant, it is there twice, its value is no quantity in its unit, or E, G and nu do not
+        determine the law.
     """
-    known = [field.name for field in fields(MATERIALS[law]) if field.name not in COMMON]
+    found = _pairs(law, text)
+    return _from_moduli(law, found) if set(MODULI) & found.keys() else found
+
+
+def constant_names(law: str, text: str) -> set[str]:
+    """The names in a text of constants; raises as :func:`read_constants`."""
+    return set(_pairs(law, text))
+
+
+def _pairs(law: str, text: str) -> dict[str, Any]:
+    own = [field.name for field in fields(MATERIALS[law]) if field.name not in COMMON]
+    known = [*own, *MODULI]
     found: dict[str, Any] = {}
     for part in filter(str.strip, text.split(",")):
         name, equals, value = (piece.strip() for piece in part.partition("="))
+        name = "nu" if name == "ν" else name
         if not equals or name not in known:
-            raise ParameterError(f"constants must be name = value pairs between commas, of {', '.join(known)} for "
-                                 f"{law}; got {part.strip()!r}")
+            comma = "; decimals stand after a point" if found and part.strip()[:1].isdigit() else ""
+            raise ParameterError(f"constants must be name = value pairs between commas, of {', '.join(own)} for "
+                                 f"{law}, or E, G and nu; got {part.strip()!r}{comma}")
         if name in found:
             raise ParameterError(f"constants: {name} is there twice")
-        if isinstance(getattr(MATERIALS[law], name), tuple):
+        if isinstance(getattr(MATERIALS[law], name, None), tuple):
             found[name] = tuple(in_unit(name, number, "") for number in value.split())
         else:
             found[name] = in_unit(name, value, constant_unit(name), plain=True)
     return found
+
+
+def _from_moduli(law: str, found: Mapping[str, Any]) -> dict[str, Any]:
+    own = {name: value for name, value in found.items() if name not in MODULI}
+    if law not in FROM_SHEAR:
+        raise ParameterError(f"constants: E, G and nu are for isotropic laws; {law} has fibres: give its own constants")
+    shear, other = FROM_SHEAR[law]
+    for name, value in found.items():
+        if name in ("E", "G"):
+            require(name, value, "MPa", low=0, low_open=True)
+    if "nu" in found and not -1 < found["nu"] < 0.5:
+        cure = "nu = 0.5 is incompressible: give nu = 0.4999, or bulk_modulus" if found["nu"] >= 0.5 else "correct it"
+        raise ParameterError(f"constants: nu must be in (-1, 0.5); got {found['nu']:g}: {cure}")
+    stiff = [name for name in ("E", "G", shear) if name in found]
+    if len(stiff) > 1:
+        raise ParameterError(f"constants: {' and '.join(stiff)} of {law} say the same: give one of them, and nu")
+    if "E" in found and "nu" not in found:
+        raise ParameterError("constants: E alone is not enough: give nu as well, such as nu = 0.499")
+    if law == "mooney-rivlin" and shear not in found and "c2" not in found:
+        raise ParameterError("constants: E, G and nu leave open how c1 and c2 of mooney-rivlin share the stiffness: "
+                             "give c2 as well, or c1 and c2")
+    if stiff and stiff[0] != shear:
+        G = found["G"] if "G" in found else found["E"] / (2 * (1 + found["nu"]))
+        defaults = {field.name: field.default for field in fields(MATERIALS[law])}
+        own[shear] = other(G, {**defaults, **own})
+        if own[shear] <= 0:
+            raise ParameterError(f"constants: {shear} of {law} would be {own[shear]:g} MPa, and must be > 0: the shear "
+                                 f"modulus {G:g} MPa is 2 (c1 + c2)")
+    if "nu" in found:
+        G, nu = material_from(law, own).shear_modulus, found["nu"]
+        own["bulk_modulus"] = 2 * G * (1 + nu) / (3 * (1 - 2 * nu))
+    return own
+
+
+def own_constants(law: str, text: str) -> tuple[str, float | None]:
+    """Constants as text without E, G and nu, and the bulk modulus [MPa] if they say it; other text is as it was.
+
+    Raises
+    ------
+    ParameterError
+        As of :func:`read_constants`.
+    """
+    if not set(MODULI) & _pairs(law, text).keys():
+        return text, None
+    found = read_constants(law, text)
+    return constants_text(material_from(law, found)), found.get("bulk_modulus")
 
 
 def constants_text(material: Material) -> str:
@@ -53,7 +128,7 @@ def constants_text(material: Material) -> str:
 
 
 def material_of(law: str, constants: str, bulk_modulus: float, density: float) -> Material:
-    """The material of a law's name, its constants as text, k [MPa] and rho0 [kg/m^3].
+    """The material of a law's name, its constants as text, k [MPa] unless these have nu, and rho0 [kg/m^3].
 
     Raises
     ------
@@ -62,4 +137,4 @@ def material_of(law: str, constants: str, bulk_modulus: float, density: float) -
     """
     if law not in MATERIALS:
         raise ParameterError(f"material must be one of {', '.join(MATERIALS)}; got {law!r}")
-    return material_from(law, {**read_constants(law, constants), "bulk_modulus": bulk_modulus, "density": density})
+    return material_from(law, {"bulk_modulus": bulk_modulus, "density": density, **read_constants(law, constants)})

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from ..errors import ParameterError, require
+from ..jit import njit
 from .general import GeneralMaterial
 
 __all__ = ["HolzapfelGasserOgden"]

@@ -19,9 +19,9 @@ from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
-from numba import njit
 
 from ..errors import require
+from ..jit import njit
 from .base import Material
 from .compiled import GENERAL_LAW, CompiledLaw
 

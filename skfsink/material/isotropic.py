@@ -10,9 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from ..errors import require
+from ..jit import njit
 from .base import Material
 
 __all__ = ["AAA", "LOCKED", "ArrudaBoyce", "Gent", "NeoHookean", "Yeoh"]

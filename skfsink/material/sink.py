@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit
 from scipy.special import gamma as gamma_function
 from scipy.special import gammaincc
 
 from ..errors import require
+from ..jit import njit
 
 __all__ = ["SinkLaw"]
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import meshio
 
 from ..errors import SkfsinkError
+from .abaqus import read_abaqus
 from .exodus import read_exodus
 from .gmsh import read_gmsh
 from .nastran import read_nastran
@@ -51,8 +52,6 @@ def read_format(path: Path) -> meshio.Mesh:
     except MemoryError:
         raise Unreadable("it needs more memory than a mesh file of its size should") from None
     except Exception as error:
-        if name == ABAQUS:  # whose reader says what is wrong
-            raise
         raise Unreadable(f"it is damaged, or not of the format {name}") from error
     mesh.info = {"notes": [], **(mesh.info or {})}
     return mesh
@@ -83,14 +82,9 @@ def _with_sets(reader: Callable[[Path], meshio.Mesh]) -> Callable[[Path], meshio
     return lambda path: named_sets(reader(path))
 
 
-def _abaqus(path: Path) -> meshio.Mesh:
-    return meshio.read(path, "abaqus")
-
-
-ABAQUS = "Abaqus"
 READERS: dict[str, tuple[str, Callable[[Path], meshio.Mesh]]] = {
     ".msh": ("MSH", read_gmsh), ".vtu": ("VTU", _with_sets(read_vtu)), ".vtk": ("VTK", _with_sets(read_vtk)),
-    ".inp": (ABAQUS, _abaqus),
+    ".inp": ("Abaqus", read_abaqus),
     **dict.fromkeys((".avs", ".ucd"), ("UCD", _with_sets(read_ucd))),
     **dict.fromkeys((".bdf", ".nas", ".fem", ".nastran"), ("Nastran", _with_sets(read_nastran))),
     **dict.fromkeys((".e", ".exo", ".ex2", ".exii"), ("Exodus", read_exodus)),

@@ -49,6 +49,9 @@ def whole(values: np.ndarray) -> np.ndarray:
 class Text:
     """Numbers in text, parted by blanks and ends of lines.
 
+    Memory: the place in the data: `take`, `reals`, `ints`, `records`, `left`, `ahead` and `end` go on from where the
+    last call ended.
+
     Parameters
     ----------
     text: of nothing but numbers.
@@ -112,6 +115,9 @@ class Text:
 
 class Binary:
     """Numbers in bytes.
+
+    Memory: the place in the data: `take`, `reals`, `ints`, `sizes`, `records` and `end` go on from where the last call
+    ended.
 
     Parameters
     ----------

@@ -29,10 +29,10 @@ def piece_of(n_nodes: int, cells: list[np.ndarray]) -> np.ndarray:
     return found
 
 
-def check_one_piece(name: str, path: str, space: Space) -> None:
+def check_one_piece(name: str, path: str, space: Space, option: bool = False) -> None:
     """See that the body is in one piece (MeshError, which says how many nodes coincide, and what to do).
 
-    `name` is that of the mesh, `path` that of its file.
+    `name` is that of the mesh, `path` that of its file; `option` says that the scene has the parameter `merge_nodes`.
     """
     piece = piece_of(space.n_nodes, [space.conn])
     n = int(piece.max()) + 1
@@ -58,8 +58,9 @@ def check_one_piece(name: str, path: str, space: Space) -> None:
     graph = coo_array((np.ones(len(pairs), np.int8), (piece[pairs[:, 0]], piece[pairs[:, 1]])), shape=(n, n))
     left = connected_components(graph, directed=False)[0]
     rest = f" ({left} pieces would be left)" if left > 1 else ""
-    raise MeshError(f"{found}; {len(pairs)} pairs of nodes coincide within {within} mm: give merge_nodes = \"{within} mm"
-                    f"\", or mend the file with skfsink mesh {path} OUT.vtu --merge-nodes {within}mm{rest}")
+    here = f"give merge_nodes = \"{within} mm\", or " if option else ""
+    raise MeshError(f"{found}; {len(pairs)} pairs of nodes coincide within {within} mm: {here}mend the file with "
+                    f"skfsink mesh {path} OUT.vtu --merge-nodes {within}mm{rest}")
 
 
 def hinges(space: Space) -> np.ndarray:

@@ -10,12 +10,15 @@ from collections.abc import Sequence
 
 import meshio
 import numpy as np
+from meshio import _mesh
 
-__all__ = ["add_note", "body_blocks", "drop_cells", "notes_of", "place", "renumber", "tidied",
+__all__ = ["add_note", "body_blocks", "drop_cells", "drop_empty", "notes_of", "place", "renumber", "tidied",
            "without_middle_nodes", "without_orphans"]
 
 #: nodes at the corners of a cell; those of a cell of higher order come first in all formats that meshio reads
 CORNERS = {"vertex": 1, "line": 2, "triangle": 3, "quad": 4, "tetra": 4, "pyramid": 5, "wedge": 6, "hexahedron": 8}
+for _kind in ("wedge15", "pyramid13"):  # kinds that meshio (5.3.5) writes of, but makes no blocks of
+    _mesh.topological_dimension.setdefault(_kind, 3)
 _LAGRANGE = {"CURVE": "line", "TRIANGLE": "triangle", "QUADRILATERAL": "quad", "TETRAHEDRON": "tetra",
              "PYRAMID": "pyramid", "WEDGE": "wedge", "HEXAHEDRON": "hexahedron"}
 
@@ -112,6 +115,15 @@ def drop_cells(mesh: meshio.Mesh, number: int, keep: np.ndarray) -> None:
                 del mesh.cell_sets[name]
     for data in mesh.cell_data.values():
         data[number] = np.asarray(data[number])[keep]
+
+
+def drop_empty(mesh: meshio.Mesh) -> None:
+    """Drop blocks without cells."""
+    kept = [i for i, block in enumerate(mesh.cells) if len(block.data)]
+    mesh.cells = [mesh.cells[i] for i in kept]
+    mesh.cell_sets = {name: [members[i] if i < len(members) else None for i in kept]
+                      for name, members in mesh.cell_sets.items()}
+    mesh.cell_data = {name: [data[i] for i in kept] for name, data in mesh.cell_data.items()}
 
 
 def place(point: Sequence[float] | np.ndarray) -> str:

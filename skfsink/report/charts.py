@@ -85,7 +85,7 @@ def energy_chart(runs: Sequence[Run], labels: Sequence[str]) -> Chart | None:
     for run, label, look in _lines(runs, labels, "U_paper"):
         event = run.event
         length = event["crack_length_mm"]
-        if not len(length) or not np.nanmax(length) > 0:
+        if not len(length) or not np.nanmax(length, initial=0.0) > 0:
             continue
         parts = event["U_paper"], event["sink_stored"] + event["sink_kinetic"]
         unit = event.units["U_paper"]

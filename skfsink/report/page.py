@@ -27,6 +27,7 @@ _KINDS = {".png": "image/png", ".gif": "image/gif", ".svg": "image/svg+xml"}
 PICTURES = (
     ("density.png", "Relative density", "Relative density γ on the deformed body at the key moments"),
     ("speed.png", "Speed of the material", "Speed of the material on the deformed body at the key moments"),
+    ("loading.png", "Loading", "Load over displacement while the body was loaded, and the least relative density"),
     ("energies.png", "Energy ledger", "Where the energy of the event is over time, stacked, and what does not add up"),
     ("tip.png", "Tip of the crack", "Length of the crack, position and speed of its leading tip, and branches"),
     ("animation.gif", "Animation", "Relative density γ on the deformed body, moving"),
@@ -59,6 +60,7 @@ class Part:
     parameters: Table
     command: str
     finished: bool
+    verdict: str
 
 
 def write_report(folders: Sequence[Path], out: Path | None = None) -> Path:
@@ -87,7 +89,7 @@ def report_page(asked: Sequence[Run]) -> str:
     """The page as text, for the runs in these folders."""
     runs = [part for run in asked for part in run.runs]
     for run in runs:
-        if run.analysis == "both" or not run.event["step"].size:
+        if run.analysis == "both" or not (run.event["step"].size or run.finished):
             raise OutputError(f"the run in {run.folder} has not come to its event yet: there is nothing to report")
     labels = run_labels(runs)
     waves = [_waves(run) for run in runs]
@@ -141,7 +143,8 @@ def _part(run: Run, label: str, several: bool) -> Part:
     rows = tuple(Row(name.replace("_", " "), "", (_flat(value),)) for name, value in choice.items() if name != "text")
     return Part(label, f"{_named(run)}, mesh {run.parameters.get('mesh', EMPTY)}, {_kind(run)}",
                 _note(run), {title: picture for title, picture in pictures.items() if picture}, tuple(run.warnings),
-                run.assumed, rows, str(choice.get("text", "")), parameter_table(run), command_line(run), run.finished)
+                run.assumed, rows, str(choice.get("text", "")), parameter_table(run), command_line(run), run.finished,
+                run.verdict)
 
 
 def _flat(value: object) -> str:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..history import onset_load
 from ..loader import ENERGIES, Run
 
 __all__ = ["Row", "Table", "cost_table", "energy_tables", "key_table", "number", "version_table"]
@@ -82,6 +83,11 @@ def _scaled(factor: float, *keys: str) -> Callable[[Run], Any]:
     return get
 
 
+def _beginning(run: Run) -> str | None:
+    place, boundary = _get(run, "onset", "place_mm"), _get(run, "onset", "boundary")
+    return None if place is None else f"{boundary}, ({', '.join(f'{x:.3g}' for x in place)}) mm"
+
+
 def _fastest(run: Run) -> Any:
     speed = run.event["tip_speed_m_per_s"]
     return float(np.nanmax(speed)) if run.analysis == "dynamic" and np.isfinite(speed).any() else None
@@ -103,9 +109,14 @@ def key_table(runs: Sequence[Run], labels: Sequence[str], waves: Sequence[tuple[
         return _row(name, unit, [get(run) for run in runs])
 
     rows = [
+        row("greatest load while it was loaded", force, "loading", "greatest_load"),
+        row("greatest W/Φ while it was loaded", "", "loading", "greatest_W_over_phi"),
+        row("nominal strength", "MPa", "material_point", "nominal_strength_MPa"),
+        row("nominal strength by theory, incompressible", "MPa", "material_point", "nominal_strength_theory_MPa"),
         row("displacement of the grips at the onset", "mm", "onset", "displacement_mm"),
-        row("load at the onset", force, "onset", "reaction_N_per_mm"),
+        _row("load at the onset", force, [onset_load(_get(run, "onset") or {}) for run in runs]),
         row("elastic energy at the onset", energy, "onset", "elastic_energy"),
+        _row("where it begins to fail", "", [_beginning(run) for run in runs]),
         row("first arrival of the crack at an edge", "µs", "event", "first_arrival_s", factor=1e6),
         row("first arrival of the crack at an edge", "sweep", "event", "first_arrival_sweep"),
         _row("mean speed of the tip up to there", "m/s", mean),
@@ -137,7 +148,7 @@ def energy_tables(runs: Sequence[Run], labels: Sequence[str]) -> list[Table]:
                 for name, _, meaning in ENERGIES]
 
     if len(runs) == 1:
-        return [_table("Energies of the event", tuple(moments.values()), rows(*moments))]
+        return [_table("Energies of the event", tuple(moments.values()), rows(*moments) if runs[0].energies else [])]
     return [_table(f"Energies {moments[key]}", labels, rows(key)) for key in ("arrival", "end")]
 
 

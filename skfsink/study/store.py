@@ -23,6 +23,8 @@ SCHEMA = 1
 class Store:
     """Points of a study by key, in a file that is replaced as a whole after each.
 
+    Memory: the `points` so far: `point` computes each once, `save` writes them all.
+
     Parameters
     ----------
     path: of the JSON file; its folder is made. A file of the same study, machine and versions is taken up.

@@ -6,12 +6,11 @@ ends, however it ends; a second process waits, and finds the run done or takes u
 
 from __future__ import annotations
 
-import fcntl
 import shutil
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
+
+from filelock import FileLock
 
 from ..deck import read_deck
 from ..errors import SkfsinkError
@@ -30,7 +29,9 @@ def finished(folder: Path) -> bool:
 
 def run_folder(folder: Path) -> None:
     """Run what the folder's deck says, from its last checkpoint if there is one, unless it is done."""
-    with _locked(folder / LOCK):
+    with reported(f"cannot write {folder / LOCK}"):
+        lock = FileLock(folder / LOCK).acquire()
+    with lock:
         if finished(folder):
             return
         (folder / FAILURE).unlink(missing_ok=True)
@@ -47,15 +48,6 @@ def run_folder(folder: Path) -> None:
             if type(error).__name__ != "Interrupted":
                 write_atomic(folder / FAILURE, f"{error}\n")
             raise
-
-
-@contextmanager
-def _locked(path: Path) -> Iterator[None]:
-    with reported(f"cannot write {path}"):
-        lock = path.open("w")
-    with lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        yield
 
 
 def main() -> None:

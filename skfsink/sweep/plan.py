@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 from typing import Any
 
+import numpy as np
 import tomli_w
 
 from ..deck import Deck, parameters_of, read_deck
 from ..errors import OutputError, require
 from ..files import reported, write_atomic
+from ..kept_mesh import MESH
 from ..progress import Display
+from ..sample import file_sample
 from ..simulate import Interrupted
 from ..tables import split
 from .engine import here, on_scheduler
-from .one import DECK, FAILURE, finished
-from .table import draw, read_rows, write_csv, write_parquet
+from .one import DECK, FAILURE, RUN, finished
+from .table import draw, read_rows, read_units, write_csv, write_parquet
 from .vary import combinations, read_variation
 
 __all__ = ["run_sweep"]
@@ -58,12 +62,12 @@ def run_sweep(path: Path, vary: Sequence[str], out: Path, jobs: int = 1, schedul
         except KeyboardInterrupt:
             raise Interrupted(f"interrupted with {done} of {len(folders)} runs done; the same command goes on"
                               ) from None
-        rows = read_rows(folders, varied)
-        write_csv(rows, out / "sweep.csv")
+        rows, units = read_rows(folders, varied), read_units(folders)
+        write_csv(rows, out / "sweep.csv", units)
         if parquet:
-            write_parquet(rows, out / "sweep.parquet")
+            write_parquet(rows, out / "sweep.parquet", units)
         if any(row["analysis"] for row in rows):
-            draw(rows, names, out / "sweep.png")
+            draw(rows, names, out / "sweep.png", units)
         display.update(1.0, str(out))
     return rows
 
@@ -79,8 +83,32 @@ def _beside(values: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     return {**values, "mesh": str((folder / mesh).absolute())} if Path(mesh).suffix else {**values}
 
 
+def _moved(present: Path, text: str) -> bool:
+    """Whether a deck of a folder is the same but for where its mesh file is; what was begun must be on that mesh.
+
+    Raises
+    ------
+    OutputError
+        A run was begun on another mesh.
+    """
+    old, new = tomllib.loads(present.read_text(encoding="utf-8")), tomllib.loads(text)
+    paths = [str(data["parameters"].pop("mesh", "")) for data in (old, new)]
+    names = [PureWindowsPath(path).name for path in paths]  # has both kinds of slashes
+    if old != new or names[0] != names[1] or not Path(names[1]).suffix:
+        return False
+    kept = present.parent / RUN / MESH
+    if kept.is_file() and Path(paths[1]).is_file():
+        one, other = file_sample(kept).space, file_sample(Path(paths[1])).space
+        if not (np.array_equal(one.X, other.X) and np.array_equal(one.conn, other.conn)):
+            raise OutputError(f"{present.parent} holds a run on another mesh than {paths[1]}; choose another --out")
+    return True
+
+
 def _lay_out(deck: Deck, varied: Sequence[Mapping[str, Any]], folders: Sequence[Path]) -> None:
-    """Make the folders and their decks; refuse those of another sweep."""
+    """Make the folders and their decks; refuse those of another sweep.
+
+    The mesh file may have moved: runs that were begun keep their mesh, the others take it from where it is now.
+    """
     texts = []
     for values in varied:
         whole = replace(deck, parameters={**deck.parameters, **values})
@@ -88,9 +116,11 @@ def _lay_out(deck: Deck, varied: Sequence[Mapping[str, Any]], folders: Sequence[
         texts.append(tomli_w.dumps({"case": whole.case, **split(whole.parameters)}))
     for folder, text in zip(folders, texts):
         present = folder / DECK
-        if present.is_file() and present.read_text(encoding="utf-8") != text:
+        if present.is_file() and present.read_text(encoding="utf-8") != text and not _moved(present, text):
             raise OutputError(f"{folder} holds a run of another sweep: its {DECK} differs; choose another --out")
     for folder, text in zip(folders, texts):
+        if (folder / DECK).is_file() and (folder / RUN / MESH).is_file():
+            continue
         with reported(f"the folder {folder} cannot be made"):
             folder.mkdir(parents=True, exist_ok=True)
         write_atomic(folder / DECK, text)

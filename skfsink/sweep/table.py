@@ -13,19 +13,25 @@ import numpy as np
 
 from ..errors import MissingExtra
 from ..files import replaced, write_atomic
+from ..history import History, history_units, onset_load
 from .one import FAILURE, RUN
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["FIGURES", "draw", "read_rows", "write_csv", "write_parquet"]
+__all__ = ["FIGURES", "draw", "read_rows", "read_units", "write_csv", "write_parquet"]
 
-#: columns of the table: name, unit, and where a summary has the figure
-FIGURES = (
+#: columns of the table: name, unit (of `load` and `energy` in `units` of the summary), and where it has the figure
+FIGURES: tuple[tuple[str, str, tuple[str | int, ...]], ...] = (
+    ("greatest_load", "load", ("loading", "greatest_load")),
     ("onset_displacement", "mm", ("onset", "displacement_mm")),
-    ("onset_load", "N/mm", ("onset", "reaction_N_per_mm")),
-    ("U", "N mm/mm", ("energy", "U_paper_at_arrival")),
-    ("D", "N mm/mm", ("energy", "D_sink_at_arrival")),
+    ("onset_load", "load", ("onset",)),
+    ("onset_boundary", "", ("onset", "boundary")),
+    ("onset_x", "mm", ("onset", "place_mm", 0)),
+    ("onset_y", "mm", ("onset", "place_mm", 1)),
+    ("onset_z", "mm", ("onset", "place_mm", 2)),
+    ("U", "energy", ("energy", "U_paper_at_arrival")),
+    ("D", "energy", ("energy", "D_sink_at_arrival")),
     ("tip_speed", "m/s", ("event", "mean_tip_speed_m_per_s")),
     ("branches", "", ("event", "max_branches")),
     ("arrival_time", "s", ("event", "first_arrival_s")),
@@ -47,34 +53,66 @@ def read_rows(folders: Sequence[Path], varied: Sequence[Mapping[str, Any]]) -> l
                  else [summary])
         for part in parts:
             row = {**values, "analysis": part.get("analysis"), **{name: _look(part, at) for name, _, at in FIGURES}}
+            row["onset_load"] = onset_load(row["onset_load"] or {})
             row["failure"] = failure.read_text().strip() if failure.is_file() else None if part else "not finished"
+            row["verdict"] = part.get("verdict")
             row["folder"] = folder.name
             rows.append(row)
     return rows
 
 
-def _look(summary: Any, at: tuple[str, ...]) -> Any:
+def _look(summary: Any, at: tuple[str | int, ...]) -> Any:
     for key in at:
-        summary = summary.get(key) if isinstance(summary, dict) else None
+        if isinstance(summary, list) and isinstance(key, int):
+            summary = summary[key] if key < len(summary) else None
+        else:
+            summary = summary.get(key) if isinstance(summary, dict) else None
     return summary
 
 
-def _heading(name: str) -> str:
-    unit = {figure: unit for figure, unit, _ in FIGURES}.get(name)
-    return f"{name} [{unit}]" if unit else name
+def read_units(folders: Sequence[Path]) -> dict[str, str]:
+    """Unit of each figure ("" for none) in the runs of these folders: loads and energies are those of their bodies.
+
+    Of a sweep over plane bodies and bodies in space it says which is which.
+    """
+    found = filter(None, (_units(folder / RUN) for folder in folders))
+    dims = {3 if units["load"] == "N" else 2 for units in found} or {2}
+    plane, space = history_units(2), history_units(3)
+
+    def unit(column: str) -> str:
+        return f"{plane[column]}, in space {space[column]}" if len(dims) == 2 else history_units(*dims)[column]
+
+    own = {"load": unit("reaction_N_per_mm"), "energy": unit("elastic")}
+    return {name: own.get(kind, kind) for name, kind, _ in FIGURES}
 
 
-def write_csv(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
-    """Write the rows, with units in the header."""
+def _units(run: Path) -> dict[str, str]:
+    """The `units` of a finished run; empty if it is not finished. Before schema 2 the history alone told them."""
+    path = run / "summary.json"
+    summary = json.loads(path.read_text()) if path.is_file() else {}
+    part = "dynamic" if summary.get("analysis") == "both" else ""
+    summary = summary.get(part, summary)
+    if not summary or "units" in summary:
+        return dict(summary.get("units", {}))
+    units = History.load(run / part / "history.csv").units
+    return {"load": units["reaction_N_per_mm"], "energy": units["elastic"]}
+
+
+def _heading(name: str, units: Mapping[str, str]) -> str:
+    return f"{name} [{units[name]}]" if units.get(name) else name
+
+
+def write_csv(rows: Sequence[Mapping[str, Any]], path: Path, units: Mapping[str, str]) -> None:
+    """Write the rows, with the `units` of the figures in the header."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([_heading(name) for name in rows[0]])
+    writer.writerow([_heading(name, units) for name in rows[0]])
     writer.writerows(["" if value is None else value for value in row.values()] for row in rows)
     write_atomic(path, text.getvalue())
 
 
-def write_parquet(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
-    """Write the rows as a Parquet file.
+def write_parquet(rows: Sequence[Mapping[str, Any]], path: Path, units: Mapping[str, str]) -> None:
+    """Write the rows as a Parquet file, with the `units` of the figures in the names of the columns.
 
     Raises
     ------
@@ -87,12 +125,12 @@ def write_parquet(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
     except ImportError as error:
         raise MissingExtra(f"a Parquet table needs pyarrow, which cannot be imported ({error}): "
                            f"install skfsink[sweep]") from None
-    table = pyarrow.table({_heading(name): [row[name] for row in rows] for name in rows[0]})
+    table = pyarrow.table({_heading(name, units): [row[name] for row in rows] for name in rows[0]})
     with replaced(path) as temporary:
         parquet.write_table(table, temporary)
 
 
-def draw(rows: Sequence[Mapping[str, Any]], varied: Sequence[str], path: Path) -> None:
+def draw(rows: Sequence[Mapping[str, Any]], varied: Sequence[str], path: Path, units: Mapping[str, str]) -> None:
     """Picture of the figures against the first parameter that varies besides the seed of the mesh.
 
     Each run is a point; where several share a value, their mean and standard deviation are beside them. If only the
@@ -107,7 +145,6 @@ def draw(rows: Sequence[Mapping[str, Any]], varied: Sequence[str], path: Path) -
     across = "mesh_seed" if ensemble else axis
     analyses = sorted({row["analysis"] for row in rows if row["analysis"]})
     figure, axes = plt.subplots(2, 2, figsize=(9, 6.4), sharex=True, layout="constrained")
-    units = {name: unit for name, unit, _ in FIGURES}
     for name, plot in zip(DRAWN, axes.flat):
         for number, analysis in enumerate(analyses):
             pairs = np.array([(row[across] if across else 0.0, row[name]) for row in rows

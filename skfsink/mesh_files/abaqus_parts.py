@@ -1,0 +1,352 @@
+"""Parts of Abaqus models: nodes, elements and sets as the data lines give them, by their numbers in the part."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .abaqus_lines import Block, Numbers, number
+from .abaqus_types import AXISYMMETRIC, ORDER, REFUSED, SIZE, cell_of
+from .unreadable import Unreadable
+
+__all__ = ["Elements", "Entry", "Named", "Part", "User", "turned"]
+
+
+@dataclass(frozen=True)
+class User:
+    """A user element: its number of nodes, and of coordinates (0 if the file does not say)."""
+
+    nodes: int
+    coordinates: int
+
+
+@dataclass
+class Elements:
+    """Elements of one `*ELEMENT`: numbers, and the numbers of their nodes (n, k), k = 0 where they are no body."""
+
+    kind: str
+    cell: str
+    numbers: np.ndarray
+    nodes: np.ndarray
+    block: Block
+    user: User | None = None
+
+
+@dataclass(frozen=True)
+class Entry:
+    """Members of a set: numbers, a range (first, last, step), or the name of a set.
+
+    `instance` is the one they are of, `face` the face of elements in a surface, and `other` whether nodes are those of
+    a set of elements.
+    """
+
+    members: np.ndarray | tuple[int, int, int] | str
+    block: Block
+    line: int | None = None
+    instance: str = ""
+    face: str = ""
+    other: bool = False
+
+
+@dataclass
+class Named:
+    """A set or surface: its name as first written, and what is put into it; `kind` is the TYPE of a surface."""
+
+    name: str
+    entries: list[Entry] = field(default_factory=list)
+    kind: str = ""
+
+
+class Part:
+    """What stands between `*PART` and `*END PART`, in an assembly, or in a file without parts.
+
+    Attributes
+    ----------
+    name: as written, "" for what is in no part.
+    nodes: numbers and coordinates (n, 3) [as written], by keyword.
+    elements: by keyword.
+    node_sets, element_sets, surfaces: by name in small letters.
+    """
+
+    def __init__(self, name: str, users: dict[str, User]) -> None:
+        self.name, self.users = name, users
+        self.nodes: list[tuple[np.ndarray, np.ndarray]] = []
+        self.elements: list[Elements] = []
+        self.node_sets: dict[str, Named] = {}
+        self.element_sets: dict[str, Named] = {}
+        self.surfaces: dict[str, Named] = {}
+        self.system = (np.eye(3), np.zeros(3))
+
+    def read_nodes(self, block: Block) -> None:
+        """`*NODE`."""
+        read = Numbers(block, whole=False)
+        if read.table is not None:
+            table = read.table
+        else:
+            rows = [(i, row[:4]) for i, row in read.rows()]
+            table = np.array([row + [0.0] * (4 - len(row)) for _, row in rows]).reshape(-1, 4)
+        numbers = table[:, 0]
+        if len(wrong := np.flatnonzero((numbers != np.floor(numbers)) | (numbers < 1) | (numbers > 2**53))):
+            raise block.error(f"{numbers[wrong[0]]:g} is no number of a node", read.at[wrong[0]])
+        points = np.zeros((len(table), 3))
+        points[:, :min(3, table.shape[1] - 1)] = table[:, 1:4]
+        self.add_nodes(numbers.astype(np.int64), self._placed(points, block), block)
+
+    def add_nodes(self, numbers: np.ndarray, points: np.ndarray, block: Block) -> None:
+        """Nodes by number, into the set that the keyword names as well."""
+        self.nodes.append((numbers, points))
+        if name := block.parameters.get("NSET"):
+            _named(self.node_sets, name).entries.append(Entry(numbers, block))
+
+    def all_nodes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Numbers and coordinates of all nodes (a node that is given again at the same place counts once).
+
+        Raises
+        ------
+        Unreadable
+            A node is at two places.
+        """
+        if not self.nodes:
+            return np.zeros(0, np.int64), np.zeros((0, 3))
+        numbers, points = np.concatenate([n for n, _ in self.nodes]), np.concatenate([x for _, x in self.nodes])
+        kept, first, inverse = np.unique(numbers, return_index=True, return_inverse=True)
+        if len(kept) < len(numbers):
+            apart = (points[first][inverse] != points).any(axis=1)
+            if apart.any():
+                raise Unreadable(f"node {numbers[apart.argmax()]} is given twice, at two places{_of(self.name)}")
+            first.sort()
+            numbers, points = numbers[first], points[first]
+        return numbers, points
+
+    def read_system(self, block: Block) -> None:
+        """`*SYSTEM`: where the coordinates of the nodes that follow are."""
+        given: list[float] = []
+        for _, row in Numbers(block, whole=False).rows():
+            given += [*row, *[0.0] * (-len(row) % 3)]
+        if len(given) not in (0, 3, 6, 9):
+            raise block.error(f"*SYSTEM takes one, two or three points; got {len(given)} numbers")
+        a, b, c = (np.array(given[k:k + 3]) if len(given) > k else None for k in (0, 3, 6))
+        axes = np.eye(3)
+        if b is not None and (b != a).any():
+            along = (b - a) / np.linalg.norm(b - a)
+            up = np.cross(along, c - a) if c is not None else np.array([0.0, 0.0, 1.0])
+            up = up - (up @ along) * along
+            if np.linalg.norm(up) <= 1e-12 * max(1.0, float(np.abs(given).max())):
+                raise block.error("the points of *SYSTEM are on one line")
+            up /= np.linalg.norm(up)
+            axes = np.array([along, np.cross(up, along), up])
+        self.system = axes, np.zeros(3) if a is None else a
+
+    def _placed(self, points: np.ndarray, block: Block) -> np.ndarray:
+        kind = block.parameters.get("SYSTEM", "R").upper()[:1]
+        if kind in ("C", "S"):
+            r, theta = points[:, 0], np.radians(points[:, 1])
+            up = np.radians(points[:, 2]) if kind == "S" else None
+            flat, z = (r, points[:, 2]) if up is None else (r * np.cos(up), r * np.sin(up))
+            points = np.column_stack([flat * np.cos(theta), flat * np.sin(theta), z])
+        elif kind != "R":
+            raise block.error(f"SYSTEM={kind} is unknown: R, C or S")
+        axes, origin = self.system
+        return points if (axes == np.eye(3)).all() and not origin.any() else points @ axes + origin
+
+    def generate_nodes(self, block: Block) -> None:
+        """`*NGEN` on a straight line."""
+        if block.parameters.get("LINE"):
+            raise block.error("*NGEN on curves is not read: write the nodes themselves")
+        numbers, points = self.all_nodes()
+        at = dict(zip(numbers.tolist(), range(len(numbers))))
+        for i, row in Numbers(block, whole=True).rows():
+            first, last, step = int(row[0]), int(row[1]) if len(row) > 1 else 0, int(row[2]) if len(row) > 2 else 1
+            if first not in at or last not in at:
+                raise block.error(f"*NGEN is between nodes that exist; got {first} and {last}", i)
+            if step == 0 or (last - first) % step or (n := (last - first) // step) < 1 or n > 10**7 or len(row) > 3:
+                raise block.error(f"*NGEN takes first, last and step, a part of their difference; got {row}", i)
+            ends, share = points[[at[first], at[last]]], np.arange(n + 1) / n
+            if name := block.parameters.get("NSET"):
+                _named(self.node_sets, name).entries.append(Entry(np.array([first, last]), block))
+            between = ends[0] + share[1:-1, None] * (ends[1] - ends[0])
+            self.add_nodes(first + step * np.arange(1, n), between, block)
+
+    def read_elements(self, block: Block) -> None:
+        """`*ELEMENT`, of any type that is known."""
+        kind = block.need("TYPE").upper()
+        if "OFFSET" in block.parameters:
+            raise block.error("*ELEMENT with OFFSET= is not read: write the numbers of the nodes themselves")
+        user = self.users.get(kind)
+        cell = cell_of(kind) if user is None else ""
+        shown = kind[:20] if kind.isprintable() else ascii(kind[:20])
+        if user is None and AXISYMMETRIC.match(kind):
+            raise block.error(f"elements {shown} are axisymmetric, which is not computed: make a plane mesh, or one of "
+                              "hexahedra of the whole body")
+        for form, reason in REFUSED if user is None else ():
+            if form.match(kind):
+                raise block.error(f"elements {shown} are {reason}")
+        if cell is None:
+            also = ": *USER ELEMENT, TYPE= is missing" if kind[:1] == "U" or kind[:2] == "VU" else ""
+            raise block.error(f"elements of type {shown} are not known{also}")
+        if user is not None:
+            read = self._rows(block, user.nodes, shown)
+        elif cell in ("", "line"):
+            read = self._loose(block)
+        else:
+            read = self._rows(block, SIZE[cell], shown)
+        numbers, nodes = read[:, 0], read[:, 1:]
+        if len(numbers) and numbers.min() < 1:
+            raise block.error(f"{numbers.min()} is no number of an element")
+        if cell == "wedge15":  # which meshio cannot hold
+            cell, nodes = "wedge", nodes[:, :6]
+        if cell in ORDER:
+            nodes = nodes[:, ORDER[cell]]
+        self.add_elements(Elements(shown, cell, numbers, nodes, block, user))
+
+    def add_elements(self, elements: Elements) -> None:
+        """Elements by number, into the set that their keyword names as well."""
+        self.elements.append(elements)
+        if name := elements.block.parameters.get("ELSET"):
+            _named(self.element_sets, name).entries.append(Entry(elements.numbers, elements.block))
+
+    @staticmethod
+    def _rows(block: Block, size: int, kind: str) -> np.ndarray:
+        """Numbers of elements and their nodes (n, 1 + size)."""
+        read = Numbers(block, whole=True)
+        if read.table is not None and read.table.shape[1] == 1 + size:
+            return read.table
+        found: list[float] = []
+        begun = 0  # entries of the element that goes on in the next line
+        for i, row in read.rows():
+            begun += len(row)
+            found += row
+            if begun == 1 + size:
+                begun = 0
+            elif begun > 1 + size or not (size > 15 or block.data[i].rstrip().endswith(",")):
+                raise block.error(f"element {int(found[-begun])} has {begun - 1} nodes; one of type {kind} has {size}",
+                                  i)
+        if begun:
+            raise block.error(f"element {int(found[-begun])} has {begun - 1} nodes; one of type {kind} has {size}",
+                              read.at[-1])
+        return np.array(found, np.int64).reshape(-1, 1 + size)
+
+    @staticmethod
+    def _loose(block: Block) -> np.ndarray:
+        """Numbers of elements that are no body, and up to three of their nodes; -1 where there are fewer."""
+        read = Numbers(block, whole=True)
+        if read.table is not None and 2 <= read.table.shape[1] <= 4:
+            table = read.table
+            return np.column_stack([table, np.full((len(table), 4 - table.shape[1]), -1)])
+        found, more = [], False
+        for i, line in ((i, block.data[i].strip()) for i in read.at):
+            if not more:
+                first = [word.strip() for word in line.split(",")][:4]
+                row = [int(number(block, i, first[0], whole=True))]
+                row += [int(w) if w.isdecimal() else -1 for w in first[1:]]
+                found.append(row + [-1] * (4 - len(row)))
+            more = line.endswith(",") and line.count(",") > 4
+        return np.array(found, np.int64).reshape(-1, 4)
+
+    def generate_elements(self, block: Block) -> None:
+        """`*ELGEN`: rows and layers of copies of an element, its nodes counted on."""
+        for i, row in Numbers(block, whole=True).rows():
+            master = int(row[0])
+            own = next((e for e in self.elements if (e.numbers == master).any()), None)
+            if own is None:
+                raise block.error(f"*ELGEN copies an element that exists; got {master}", i)
+            numbers, nodes = np.array([master]), own.nodes[own.numbers == master]
+            if not nodes.size:
+                raise block.error(f"*ELGEN of elements {own.kind} is not read", i)
+            steps = [int(x) for x in row[1:]]
+            if len(steps) > 9:
+                raise block.error("*ELGEN takes up to 10 numbers", i)
+            for k in range(0, len(steps), 3):
+                n, by_node, by_element = (*steps[k:k + 3], *(1, 1, 1)[len(steps[k:k + 3]):])
+                if n < 1 or n * len(numbers) > 10**7:
+                    raise block.error(f"*ELGEN of {n} copies", i)
+                copies = np.arange(n)
+                numbers = (numbers + by_element * copies[:, None]).ravel()
+                nodes = (nodes + by_node * copies[:, None, None]).reshape(len(numbers), -1)
+            generated = Elements(own.kind, own.cell, numbers[1:], nodes[1:], own.block, own.user)
+            self.elements.append(generated)
+            for name, known in ((own.block.parameters.get("ELSET"), numbers[1:]),
+                                (block.parameters.get("ELSET"), numbers)):
+                if name:
+                    _named(self.element_sets, name).entries.append(Entry(known, block))
+
+    def read_set(self, block: Block) -> None:
+        """`*NSET` or `*ELSET`."""
+        sets = self.node_sets if block.keyword == "NSET" else self.element_sets
+        entries = _named(sets, block.need(block.keyword)).entries
+        instance = block.parameters.get("INSTANCE", "")
+        if block.keyword == "NSET" and (source := block.parameters.get("ELSET")):
+            entries.append(Entry(source, block, None, instance, other=True))
+        if "GENERATE" in block.parameters:
+            for i, row in Numbers(block, whole=True).rows():
+                first, last, step = (*map(int, row), *([1] if len(row) == 2 else []))[:3] if len(row) > 1 else (1, 0, 0)
+                if len(row) > 3 or step < 1 or first > last:
+                    raise block.error("a line of GENERATE is first, last and step, ascending; got "
+                                      + ", ".join(str(int(x)) for x in row), i)
+                entries.append(Entry((first, last, step), block, i, instance))
+            return
+        read = Numbers(block, whole=True)
+        texts = [block.data[i].strip() for i in read.at]
+        joined = ",".join(t[:-1] if t.endswith(",") else t for t in texts)
+        many = read.many(joined.split(",")) if texts and "_" not in joined else None
+        if many is not None:
+            entries.append(Entry(many, block, None, instance))
+            return
+        for i, entered in block.rows():
+            for word in filter(None, entered):
+                plain = word.lstrip("+-").replace(".", "").isdecimal() or not word[:1].strip("+-.")
+                entries.append(Entry(np.array([int(number(block, i, word, whole=True))]) if plain else word, block, i,
+                                     instance))
+
+    def read_surface(self, block: Block) -> None:
+        """`*SURFACE` of elements, of nodes, or several together."""
+        surface = _named(self.surfaces, block.need("NAME"))
+        surface.kind = block.parameters.get("TYPE", "ELEMENT").upper()
+        if "COMBINE" in block.parameters:
+            how = block.parameters["COMBINE"].upper()
+            if how != "UNION":
+                raise block.error(f"the surface {surface.name[:60]!r} is made by COMBINE={how[:20]}, which is not "
+                                  "read: write its faces")
+            surface.kind = "UNION"
+        if "CROP" in block.parameters:
+            raise block.error(f"the surface {surface.name[:60]!r} is made by CROP=, which is not read: write its faces")
+        for i, row in block.rows():
+            names = row if surface.kind == "UNION" else row[:1]
+            for word in names:
+                numeric = word.isdecimal()
+                members: np.ndarray | str = np.array([int(number(block, i, word, whole=True))]) if numeric else word
+                face = row[1].upper() if surface.kind == "ELEMENT" and len(row) > 1 else ""
+                surface.entries.append(Entry(members, block, i, "", face))
+
+
+def _named(sets: dict[str, Named], name: str) -> Named:
+    return sets.setdefault(name.lower(), Named(name))
+
+
+def _of(name: str) -> str:
+    return f" of part {name[:60]!r}" if name else ""
+
+
+def turned(points: np.ndarray, block: Block) -> np.ndarray:
+    """Points (n, 3) moved and turned as the data lines of `*INSTANCE` say: first moved, then turned."""
+    lines = [row for _, row in Numbers(block, whole=False).rows()]
+    if not lines:
+        return points
+    if len(lines[0]) == 7:  # an empty first line
+        lines = [[0.0], *lines]
+    if len(lines) > 2 or len(lines[0]) > 3 or (len(lines) == 2 and len(lines[1]) != 7):
+        raise block.error("an instance is placed by a line of 3 and one of 7 numbers")
+    points = points + np.array([*lines[0], 0.0, 0.0][:3])
+    if len(lines) == 1 or not lines[1][6]:
+        return points
+    a, b, angle = np.array(lines[1][:3]), np.array(lines[1][3:6]), math.radians(lines[1][6])
+    if not (length := float(np.linalg.norm(b - a))) > 0:
+        raise block.error("the two points on the axis of its rotation are one", 1)
+    axis, from_a = (b - a) / length, points - a
+    quarter = round(lines[1][6] / 90)
+    cos, sin = ((1, 0, -1, 0)[quarter % 4], (0, 1, 0, -1)[quarter % 4]) if lines[1][6] == 90 * quarter else (
+        math.cos(angle), math.sin(angle))
+    along: np.ndarray = (from_a @ axis)[:, None] * axis
+    return a + along + cos * (from_a - along) + sin * np.cross(axis, from_a)
