@@ -73,8 +73,8 @@ class Notes(logging.Handler):
 class Guard:
     """Watches one run of a scene.
 
-    Memory: evenness and energy at the onset, and failed elements at the last step; `check_step`, `check_record` and
-    `even` judge by them.
+    Memory: evenness and energy at the onset, and failed elements at the last step, and how deep faces overlapped;
+    `check_step`, `check_record`, `check_overlap`, `check_end` and `even` judge by them.
 
     Parameters
     ----------
@@ -233,7 +233,7 @@ class Guard:
             Energy has been fed in, or is no number; too much failed at once; a live point is inside out.
         """
         ledger = state.ledger
-        fed = -ledger.numerical / self.scale
+        fed = -ledger.numerical / ledger.scale(self.scale)
         allowed = self.scene.controls.balance_tolerance
         if not (fed <= allowed and np.isfinite(ledger.elastic + ledger.kinetic)):
             raise InstabilityError(f"energy fed in by the integrator {fed:.2%} of the onset energy at "
@@ -257,7 +257,7 @@ class Guard:
             The ledger is open, a field is not finite, the body is gone, or a live point is inside out.
         """
         ledger, space, l = state.ledger, self.space, self.scene.sink_law.length_scale
-        allowed, scale = self.scene.controls.balance_tolerance, self.scale
+        allowed, scale = self.scene.controls.balance_tolerance, ledger.scale(self.scale)
         worst, name = max((ledger.error(scale), "energy balance error"),
                           (ledger.deletion / scale, "energy lost in deleted elements"), key=_nan_first)
         if not worst <= allowed:

@@ -32,7 +32,8 @@ def njit(*functions: Callable[..., Any], cache: bool = False, **options: Any) ->
     """As `numba.njit`, with the cache of this package."""
     def compiled(function: Callable[..., Any]) -> Any:
         dispatcher = numba.njit(**options)(function)
-        if cache and _folder(Path(function.__code__.co_filename).parent) is not None:
+        file = Path(function.__code__.co_filename).absolute()
+        if cache and file.is_file() and _folder(file.parent) is not None:  # a frozen program has no files
             dispatcher._cache = _Cache(function)
         return dispatcher
 
@@ -47,7 +48,7 @@ class _Locator(caching._CacheLocator):  # type: ignore[misc]
 
     @classmethod
     def from_function(cls, function: Any, file: str) -> _Locator:
-        return cls(Path(file))
+        return cls(Path(file).absolute())
 
     def get_cache_path(self) -> str:
         return str(_folder(self._file.parent))

@@ -215,7 +215,7 @@ class Options:
     given: Annotated[frozenset[str], Parameter(parse=False)] = frozenset()
 
     def __post_init__(self) -> None:
-        for name in ("out", "resume", "corridor"):
+        for name in ("out", "resume", "corridor", "kept"):
             if isinstance(folder := getattr(self, name), str):
                 object.__setattr__(self, name, Path(folder))
         require("speed", self.speed, "mm/s", low=0, low_open=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import inspect
 import logging
+import os
 import shlex
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
@@ -74,7 +75,7 @@ def run_case(case: Callable[..., Result], make_scene: SceneMaker, own: dict[str,
                 refuse(scene)  # before anything is written
             with ExitStack() as locks:
                 places = [folder, *(folder / part for part in PARTS if options.analysis == "both")]
-                there = [place for place in places if place == folder or place.exists()]
+                there = [place for place in places if place == folder or os.path.isdir(place)]
                 notes += [locks.enter_context(occupied(place)) for place in there]
                 if not resume:
                     _begin(folder, options.overwrite)

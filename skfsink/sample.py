@@ -257,7 +257,7 @@ def _from_meshio(name: str, data: meshio.Mesh, made: bool = False, source: str =
     except MeshError as error:
         raise MeshError(f"mesh {shown}: {error}") from None
     return Sample(info.get("name") or Path(name).stem, space, _boundaries(data, facet), info.get("made", made),
-                  _elements(data, kind), notes_of(data), info.get("source", source))
+                  cells=_elements(data, kind), notes=notes_of(data), source=info.get("source", source))
 
 
 def _elements(data: meshio.Mesh, kind: str) -> dict[str, np.ndarray]:

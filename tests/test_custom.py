@@ -197,6 +197,15 @@ def test_engineering_constants_of_aaa() -> None:
         Options(constants="G = 3 MPa", c1=1.0)
 
 
+def test_engineering_constants_of_the_command() -> None:
+    """Fails if `skfsink material` takes other names than decks do."""
+    status, err, out = invoke_program("material", "gent", "--E", "1.2", "--nu", "0.45", "--density", "1000")
+    assert (status, err) == (0, "") and "bulk_modulus 4, density 1000, mu 0.413793" in " ".join(out.split())
+    status, err, _ = invoke_program("material", "gent", "--nu", "0.45", "--bulk-modulus", "4")
+    assert status == 2 and "say the same" in err and err.count("\n") == 1
+    assert "bulk_modulus 4," in invoke_program("material", "gent", "--G", "1", "--bulk-modulus", "4")[2]
+
+
 @pytest.mark.parametrize(("options", "said"), [
     ({"constants": "c1 = 1"}, "constants are those of another law than aaa"), ({"phi": -1.0}, "phi must be"),
     ({"material": "gent", "c1": 0.5}, "c1 is a constant of aaa"),

@@ -40,7 +40,7 @@ def test_a_kept_mesh_reads_as_it_was(kind: str, tmp_path: Path) -> None:
     dice = np.random.default_rng(1)
     boundaries = {name: np.unique(dice.integers(0, space.n_nodes, 9)) for name in NAMES}
     cells = {name: np.unique(dice.integers(0, space.n_elements, 5)) for name in NAMES}
-    of = Sample("my mesh", space, boundaries, True, cells, "C:\\somewhere\\my mesh.inp")
+    of = Sample("my mesh", space, boundaries, True, cells=cells, source="C:\\somewhere\\my mesh.inp")
     keep_mesh(of, tmp_path / "mesh.npz")
     keep_mesh(of, tmp_path / "again.npz")
     assert (tmp_path / "mesh.npz").read_bytes() == (tmp_path / "again.npz").read_bytes()

@@ -30,7 +30,8 @@ def material(name: str, /, *, phi: float | None = None, m: float | None = None, 
     out
         Picture to write: a .png, .pdf or .svg file.
     constants
-        Constants of the law by name, such as --mu 0.3; vectors as --axis 1,0,0. An unknown one lists those there are.
+        Constants of the law by name, such as --mu 0.3, or --E 0.9 --nu 0.499; vectors as --axis 1,0,0. An unknown one
+        lists those there are.
     """
     from dataclasses import fields
 
@@ -39,11 +40,17 @@ def material(name: str, /, *, phi: float | None = None, m: float | None = None, 
 
     from ..errors import ParameterError
     from ..homogeneous import peaks
-    from ..material import LIMITERS, SinkLaw, material_from
+    from ..material import LIMITERS, MATERIALS, MODULI, SinkLaw, material_from, read_constants
 
     if out is not None and out.suffix not in PICTURES:
         raise ParameterError(f"out must be a file ending in {', '.join(PICTURES)}; got {str(out)!r}")
-    chosen = material_from(name, {key.replace("-", "_"): _value(text) for key, text in constants.items()})
+    found: dict[str, Any] = {key.replace("-", "_"): text for key, text in constants.items()}
+    if name in MATERIALS and set(MODULI) & found.keys():
+        beside = {key: found.pop(key) for key in ("density", *("bulk_modulus",) * ("nu" not in found)) if key in found}
+        if "bulk_modulus" in found:
+            raise ParameterError("bulk-modulus and nu say the same: give one of them")
+        found = {**beside, **read_constants(name, ", ".join(f"{key} = {text}" for key, text in found.items()))}
+    chosen = material_from(name, {key: _value(text) for key, text in found.items()})
     limiter = LIMITERS[name]
     law = SinkLaw(phi=limiter.phi if phi is None else phi, m=limiter.m if m is None else m)
     strengths = peaks(chosen, law)
@@ -81,8 +88,10 @@ def _text(value: Any) -> str:
     return f"({', '.join(f'{x:g}' for x in value)})" if isinstance(value, tuple) else f"{value:g}"
 
 
-def _value(text: str) -> Any:
+def _value(text: Any) -> Any:
     """The number or vector in the text, or the text itself: the material then says what is allowed."""
+    if not isinstance(text, str):
+        return text
     try:
         numbers = tuple(float(part) for part in text.split(","))
     except ValueError:

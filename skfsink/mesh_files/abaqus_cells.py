@@ -25,6 +25,8 @@ Names = list[tuple[str, list[tuple[Placed, Named]]]]
 class Cells:
     """The elements of a body as cells.
 
+    Memory: the cells so far, from which `mesh` is made.
+
     Attributes
     ----------
     block, row: of each element, among the cells; block -1 where it has no cell.

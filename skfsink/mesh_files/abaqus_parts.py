@@ -62,6 +62,9 @@ class Named:
 class Part:
     """What stands between `*PART` and `*END PART`, in an assembly, or in a file without parts.
 
+    Memory: what the keywords so far have brought: `read_nodes`, `add_nodes`, `generate_nodes`, `read_elements`,
+    `add_elements` and `generate_elements` add to it, `all_nodes` has the nodes so far.
+
     Attributes
     ----------
     name: as written, "" for what is in no part.

@@ -23,9 +23,9 @@ __all__ = ["FIGURES", "draw", "read_rows", "read_units", "write_csv", "write_par
 
 #: columns of the table: name, unit (of `load` and `energy` in `units` of the summary), and where it has the figure
 FIGURES: tuple[tuple[str, str, tuple[str | int, ...]], ...] = (
-    ("greatest_load", "load", ("loading", "greatest_load")),
     ("onset_displacement", "mm", ("onset", "displacement_mm")),
     ("onset_load", "load", ("onset",)),
+    ("greatest_load", "load", ("loading", "greatest_load")),
     ("onset_boundary", "", ("onset", "boundary")),
     ("onset_x", "mm", ("onset", "place_mm", 0)),
     ("onset_y", "mm", ("onset", "place_mm", 1)),
