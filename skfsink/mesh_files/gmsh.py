@@ -53,13 +53,17 @@ def read_gmsh(path: Path) -> meshio.Mesh:
     if body < 3 and msh.solids:
         notes.append("the model has a volume of which no element was saved: the surfaces are taken for a plane body; "
                      "make a physical group of the volume as well")
-    groups = _groups(msh, blocks, notes)
+    physical = any(block.groups for block in blocks)
+    groups = _groups(msh, blocks, physical, notes)
+    used = np.unique(np.concatenate([block.nodes.ravel() for block in blocks if DIMENSION[block.kind] == body]))
     cell_sets: dict[str, list[np.ndarray]] = {}
     point_sets: dict[str, list[np.ndarray]] = {}
     for (dim, name), members in groups.items():
         if dim < body - 1:
-            point_sets.setdefault(name, []).extend(
-                block.nodes[index, :CORNERS[SHAPE[block.kind]]].ravel() for block, index in zip(blocks, members))
+            nodes = np.concatenate([block.nodes[index, :CORNERS[SHAPE[block.kind]]].ravel()
+                                    for block, index in zip(blocks, members)])
+            if physical or np.isin(nodes, used).any():  # of points that only help to draw there is nothing to say
+                point_sets.setdefault(name, []).append(nodes)
         else:
             found = cell_sets.setdefault(name, [np.zeros(0, np.int64) for _ in blocks])
             found[:] = [np.union1d(one, two) for one, two in zip(found, members)]
@@ -102,9 +106,9 @@ def _joined(blocks: list[Block]) -> Block:
                  shifted([block.groups for block in blocks]), shifted([block.entities for block in blocks]))
 
 
-def _groups(msh: Msh, blocks: list[Block], notes: list[str]) -> dict[tuple[int, str], list[np.ndarray]]:
-    """Elements of each block in each group, by the dimension and the name of the group."""
-    physical = any(block.groups for block in blocks)
+def _groups(msh: Msh, blocks: list[Block], physical: bool,
+            notes: list[str]) -> dict[tuple[int, str], list[np.ndarray]]:
+    """Elements of each block in each group, `physical` or elementary, by the dimension and the name of the group."""
     if msh.names and not physical:
         notes.append("no element is in a physical group, though there are names of some, as gmsh writes files of "
                      "version 2 with Mesh.SaveAll: save it as MSH 4.1, or without Mesh.SaveAll")

@@ -70,9 +70,9 @@ def read_ucd(path: Path) -> meshio.Mesh:
 def _numbers(lines: list[list[bytes]], first: int, end: int, what: str) -> np.ndarray:
     """Numbers of the words of lines from the `first` to the `end`, which is that of the lines."""
     if any(len(words) != end for words in lines):
-        raise Unreadable(f"its {what} have lines of more or fewer words than {end}")
+        raise Unreadable(f"its list of {what} has lines of more or fewer words than {end}")
     text = b" ".join(word for words in lines for word in words[first:])
-    return Text(text, f"its {what}").values.reshape(len(lines), -1)
+    return Text(text, f"its list of {what}").values.reshape(len(lines), -1)
 
 
 def _data(lines: list[list[bytes]], count: int, n: int) -> tuple[dict[str, np.ndarray], list[list[bytes]]]:

@@ -72,12 +72,12 @@ class _File:
 
     def array(self, n: int, kind: str, what: str) -> np.ndarray:
         """The next `n` numbers."""
-        where = f"its {what}"
+        where = f"its list of {what}"
         if kind.lower() == "bit":
             return (self.array(n, "char", what) if self.text
                     else np.unpackbits(self.array(-(-n // 8), "unsigned_char", what))[:n])
         if (dtype := TYPES.get(kind.lower())) is None:
-            raise Unreadable(f"{where} are of the type {kind[:20]}, which is not read")
+            raise Unreadable(f"{where} is of the type {kind[:20]}, which is not read")
         if self.text:
             following = NEXT.search(self.data, self.at)
             end = following.start() if following else len(self.data)
@@ -88,7 +88,7 @@ class _File:
             return values
         size = np.dtype(dtype).itemsize
         if not 0 <= n <= (len(self.data) - self.at) // size:
-            raise Unreadable(f"{where} are fewer than it says")
+            raise Unreadable(f"{where} has fewer numbers than it says")
         values = np.frombuffer(self.data, ">" + dtype, n, self.at).astype(dtype)
         self.at += n * size
         return values

@@ -54,7 +54,7 @@ def read_vtu(path: Path) -> meshio.Mesh:
     try:
         root = ET.fromstring(text)
     except ET.ParseError as error:
-        raise Unreadable(f"it is not XML, or cut off ({error})") from None
+        raise Unreadable(f"it is not XML, or cut off: see line {error.position[0]}") from None
     if root.tag != "VTKFile" or root.get("type") != "UnstructuredGrid":
         raise Unreadable(f"it holds {root.get('type') or 'something else'} and not UnstructuredGrid; "
                          "in ParaView apply Append Datasets and save it as VTU")
