@@ -64,7 +64,8 @@ class Placed:
 class Body:
     """All parts where they are placed.
 
-    Memory: what has been given to `place`; `node_set`, `element_set`, `entry`, `faces`, `free` and `nodes_of` look in it.
+    Memory: what has been given to `place`; `node_set`, `element_set`, `entry`, `faces`, `free` and `nodes_of` look in
+    it.
 
     Attributes
     ----------
