@@ -266,6 +266,14 @@ def test_user_elements_alone(tmp_path: Path) -> None:
     assert "2 user elements U8 of 8 nodes" in line and "CPE4" in line
 
 
+def test_user_elements_partly_with_a_layer(tmp_path: Path) -> None:
+    """Fails if user elements beside a layer that covers some of them are lost, or those under it count twice."""
+    layer = "*Element, type=CPE4\n11, 1, 2, 5, 4\n12, 2, 3, 6, 5\n"
+    mesh = read(tmp_path, f"*Node\n{NODES}{USER}*Element, type=U1, elset=uel\n{QUADS}{layer}*Elset, elset=e\n1, 4, 11\n")
+    assert sorted(mesh.cells_dict["quad"].tolist()) == CONN.tolist() and len(members(mesh, "uel")) == 4
+    assert mesh.cells_dict["quad"][members(mesh, "e")].tolist() in (CONN[[0, 3]].tolist(), CONN[[3, 0]].tolist())
+
+
 # --- nodes ---
 def test_several_blocks_of_nodes(tmp_path: Path) -> None:
     """Fails if only the last *NODE counts, or a set on it is lost."""
