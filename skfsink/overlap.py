@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from .deformed import FACETS, outer_facets
+from .jit import njit
 from .space import Space
 
 __all__ = ["Overlap", "overlap"]

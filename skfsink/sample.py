@@ -15,6 +15,7 @@ import skfem
 from skfem.io.meshio import INV_HEX_MAPPING
 
 from .errors import MeshError, ParameterError, require
+from .kept_mesh import SUFFIX
 from .mesh_file import check_mesh, one_line, quietly, read_mesh_file
 from .mesh_files.pieces import check_one_piece, hinges, merged
 from .mesh_files.split import counted, needs_split
@@ -217,7 +218,7 @@ def _from_file(path: Path, merge_nodes: float = 0.0, option: bool = False) -> Sa
     """The sample in a mesh file, in one piece; `option` says that the scene has the parameter `merge_nodes`."""
     name = one_line(str(path))
     data = read_mesh_file(path)
-    if merge_nodes:
+    if merge_nodes and path.suffix.lower() != SUFFIX:  # that of a run has been merged already
         check_mesh(name, merged(name, data, merge_nodes))
     sample = _from_meshio(str(path), data, source=str(path))
     check_one_piece(sample.name, shlex.quote(name), sample.space, option)
