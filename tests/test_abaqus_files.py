@@ -232,6 +232,13 @@ def test_sets_of_element_blocks(tmp_path: Path) -> None:
     assert members(mesh, "b") == [1, 2] and members(mesh, "c") == [3] and list(mesh.cell_sets) == ["b", "c"]
 
 
+def test_elements_that_are_no_body_with_any_nodes(tmp_path: Path) -> None:
+    """Fails if nodes of what is left out, of whatever number or missing, are a traceback."""
+    mesh = read(tmp_path, PLATE + "*ELEMENT, TYPE=T2D2\n7, 1, 99999999999999999999\n*ELEMENT, TYPE=SPRING1\n8, 99\n9\n")
+    is_plate(mesh)
+    assert "T2D2 (line 16) are no body" in notes(mesh) and "2 element(s) of type SPRING1" in notes(mesh)
+
+
 # --- user elements ---
 USER = "*User element, nodes=4, type=U1, properties=2, coordinates=2, var=8\n1, 2\n3\n"
 
@@ -269,7 +276,8 @@ def test_user_elements_alone(tmp_path: Path) -> None:
 def test_user_elements_partly_with_a_layer(tmp_path: Path) -> None:
     """Fails if user elements beside a layer that covers some of them are lost, or those under it count twice."""
     layer = "*Element, type=CPE4\n11, 1, 2, 5, 4\n12, 2, 3, 6, 5\n"
-    mesh = read(tmp_path, f"*Node\n{NODES}{USER}*Element, type=U1, elset=uel\n{QUADS}{layer}*Elset, elset=e\n1, 4, 11\n")
+    text = f"*Node\n{NODES}{USER}*Element, type=U1, elset=uel\n{QUADS}{layer}*Elset, elset=e\n1, 4, 11\n"
+    mesh = read(tmp_path, text)
     assert sorted(mesh.cells_dict["quad"].tolist()) == CONN.tolist() and len(members(mesh, "uel")) == 4
     assert mesh.cells_dict["quad"][members(mesh, "e")].tolist() in (CONN[[0, 3]].tolist(), CONN[[3, 0]].tolist())
 

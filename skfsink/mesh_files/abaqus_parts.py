@@ -219,7 +219,7 @@ class Part:
             if not more:
                 first = [word.strip() for word in line.split(",")][:4]
                 row = [int(number(block, i, first[0], whole=True))]
-                row += [int(w) if w.isdecimal() else -1 for w in first[1:]]
+                row += [int(w) if w.isdecimal() and len(w) < 19 else -1 for w in first[1:]]
                 found.append(row + [-1] * (4 - len(row)))
             more = line.endswith(",") and line.count(",") > 4
         return np.array(found, np.int64).reshape(-1, 4)
