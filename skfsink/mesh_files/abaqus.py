@@ -72,7 +72,10 @@ class Model:
         self.names = {kind: self._names(kind) for kind in ("node_sets", "element_sets", "surfaces")}
 
     def _by_meshio(self, blocks: list[Block]) -> None:
-        """Files of meshio (5.3) have the type CAX4P, the last of its table, for all quadrilaterals."""
+        """Files of meshio (5.3) have the last type of its table: CAX4P for all quadrilaterals, R3D3 for triangles."""
+        for block in blocks:
+            if block.keyword == "ELEMENT" and block.parameters.get("TYPE") in ("R3D3", "R3D4"):
+                block.parameters["TYPE"] = block.parameters["TYPE"].replace("R3D", "S")
         wrong = [block for block in blocks if block.keyword == "ELEMENT" and block.parameters.get("TYPE") == "CAX4P"]
         for block in wrong:
             block.parameters["TYPE"] = "CPE4"
