@@ -102,7 +102,7 @@ def test_a_body_that_is_stretched_far_is_followed_over_its_peak() -> None:
 
 
 def test_a_body_that_is_pressed_is_not_beside_tension() -> None:
-    """Fails if uniaxial compression is compared with equibiaxial tension, whose stretches it has: a difference of -1."""
+    """Fails if uniaxial compression is compared with equibiaxial tension, whose stretches it has."""
     pressed = scene((4, 1), (4.0, 1.0), 1.0, pull=-SPEED)
     body = Loaded(pressed)
     F, P = body.strain[int(np.argmax(body.loads))]
@@ -268,6 +268,17 @@ def test_loading_and_unloading_is_a_result(tmp_path: Path) -> None:
     assert invoke_program("resume", folder, "--quiet")[0] == 0
     assert json.loads((folder / "summary.json").read_text())["verdict"] == summary["verdict"]
     assert (folder / "history.csv").read_bytes() == history
+
+
+def test_the_greatest_load_is_that_of_its_amount(tmp_path: Path) -> None:
+    """Fails if a push before the pull that breaks the body is its strength, since it has the other sign."""
+    summary = run(tmp_path, (5, 1), (2.5, 0.5), 0.5, '[["0 s", 0], ["1 s", "-0.4 mm"], ["2 s", 0], ["3 s", "1 mm"]]',
+                  event_time="1 us", head=HEAD.replace("[[grips]]", """[[grips]]
+boundary = "left"
+x = [["0 s", 0], ["3 s", "0.1 mm"], ["4 s", 0]]
+[[grips]]""", 1).replace('boundary = "left"\nx = 0', 'boundary = "bottom"\ny = 0'))
+    loading = summary["loading"]
+    assert loading["greatest_load"] == pytest.approx(-1.131 * 0.5, rel=2e-3)
 
 
 def test_both_analyses_report_the_same_strength(tmp_path: Path) -> None:
