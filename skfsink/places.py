@@ -15,11 +15,12 @@ import numpy as np
 
 from . import indicators
 from .crack import CrackTracker, Plane
+from .density import DensitySolver
 from .loads import Grip, Ramp
 from .scene import Scene
 from .state import State
 
-__all__ = ["beginning", "check_arrival", "check_beginning", "rim_of", "said", "symmetry_planes"]
+__all__ = ["beginning", "check_arrival", "check_beginning", "greatest_ratio", "rim_of", "said", "symmetry_planes"]
 
 log = logging.getLogger(__name__)
 
@@ -164,6 +165,14 @@ def _on_plane(scene: Scene, x: np.ndarray) -> bool:
     """Whether a point is at a plane of symmetry, where half of a slit ends without a corner."""
     X, l = scene.sample.space.X, scene.sink_law.length_scale
     return any(_distance(X[plane.nodes], x) <= l for _, plane in symmetry_planes(scene))
+
+
+def greatest_ratio(density: DensitySolver, state: State) -> tuple[float, np.ndarray]:
+    """Greatest W/Phi that any Gauss point has seen, and the middle of its element [mm]."""
+    ratio = (state.W_max / density.phi).max(axis=1)
+    space = density.space
+    middle: np.ndarray = space.X[space.conn[int(np.argmax(ratio))]].mean(axis=0)
+    return float(ratio.max()), middle
 
 
 # --- the end ---

@@ -16,7 +16,7 @@ from .loading import Loading
 from .material_point import mean_deformation, mean_stress
 from .momentum import Momentum
 from .output import History, Series, prepare_folder, write_atomic
-from .places import beginning, check_beginning, rim_of
+from .places import beginning, check_beginning, greatest_ratio, rim_of
 from .scene import Scene
 from .state import State
 from .stress import cauchy_stress, pressure, von_mises
@@ -122,6 +122,8 @@ class Recorder:
                       "elastic_energy": state.ledger.elastic, "gamma_min": float(state.gamma.min()),
                       "sink": state.ledger.sink, "work": state.ledger.work,
                       "loading_balance": state.ledger.balance, **beginning(self.scene, state)}
+        ratio, place = greatest_ratio(self.density, state)
+        self.onset |= {"ratio": ratio, "place_of_ratio": place.tolist()}
         check_beginning(self.scene, state)
         self.guard.scale = state.ledger.elastic
         self.guard.check_onset(state)

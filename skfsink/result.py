@@ -13,11 +13,12 @@ import numpy as np
 from .history import history_units, load_name
 from .material_point import beside_theory
 from .output import versions
+from .places import greatest_ratio
 from .quantities import measured
 from .scene import Scene
 from .simulate import Simulation
 from .state import State
-from .verdict import greatest_ratio, verdict
+from .verdict import verdict
 
 __all__ = ["SCHEMA", "Result", "summarize"]
 
@@ -65,6 +66,8 @@ def summarize(scene: Scene, simulation: Simulation) -> dict[str, Any]:
     units = history_units(space.dim)
     balances = [abs(row["balance"]) for row in recorder.history.rows if row["phase"] != "loading"]
     ratio, place = greatest_ratio(simulation.density, state)
+    if "ratio" in onset:  # while it was loaded; beyond, W of dead points grows without meaning
+        ratio, place = onset["ratio"], onset["place_of_ratio"]
     return {
         "schema": SCHEMA, "case": scene.case, "mesh": scene.sample.name, "analysis": scene.controls.analysis,
         "integrator": scene.controls.integrator if dynamic else None, "verdict": verdict(scene, simulation),

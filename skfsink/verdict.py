@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from .density import DensitySolver
+from .places import greatest_ratio
 from .scene import Scene
 from .simulate import Simulation
-from .state import State
 
-__all__ = ["greatest_ratio", "verdict"]
+__all__ = ["verdict"]
+
+SOFTENED = 0.99  # least gamma of a body that has kept its strength
 
 
 def verdict(scene: Scene, simulation: Simulation) -> str:
@@ -17,8 +18,10 @@ def verdict(scene: Scene, simulation: Simulation) -> str:
     state, tracker, event = simulation.state, simulation.recorder.tracker, scene.controls.event_time
     if simulation.unfailed:
         ratio, place = greatest_ratio(simulation.density, state)
-        return (f"nothing failed: the greatest W/Phi was {ratio:.3g}, at {at(place)}, where points fail near 1; the "
-                f"loading ended because {simulation.unfailed}")
+        least = float(state.gamma.min())
+        soft = f"; the body has softened to gamma = {least:.3g}" if least < SOFTENED else ""
+        return (f"nothing failed: the greatest W/Phi was {ratio:.3g}, at {at(place)}, where points fail near 1{soft}; "
+                f"the loading ended because {simulation.unfailed}")
     if simulation.dissolved:
         return f"failed everywhere at once, {_when(scene, state.time)}: no place of it was weaker than another"
     cracked = np.isfinite(tracker.cracked_at)
@@ -40,14 +43,6 @@ def verdict(scene: Scene, simulation: Simulation) -> str:
         return f"the crack was still running at event_time = {event:g} s: its tip is at {tip}"
     arrived = "" if tracker.arrival is None else f" after it had arrived {_when(scene, tracker.arrival)}"
     return f"arrested at {tip}{arrived}: no tip has moved for 5 l/c_s at the end of the event"
-
-
-def greatest_ratio(density: DensitySolver, state: State) -> tuple[float, np.ndarray]:
-    """Greatest W/Phi that any Gauss point has seen, and the middle of its element [mm]."""
-    ratio = (state.W_max / density.phi).max(axis=1)
-    space = density.space
-    middle: np.ndarray = space.X[space.conn[int(np.argmax(ratio))]].mean(axis=0)
-    return float(ratio.max()), middle
 
 
 def at(place: np.ndarray) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -289,6 +290,20 @@ def test_both_analyses_report_the_same_strength(tmp_path: Path) -> None:
     assert [dynamic["loading"][name] for name in greatest] == [quasistatic["loading"][name] for name in greatest]
     assert quasistatic["loading"]["greatest_load"] > 1.005 * quasistatic["onset"]["reaction_N_per_mm"]
     assert quasistatic["material_point"] == dynamic["material_point"]
+    assert quasistatic["loading"]["greatest_W_over_phi"] == dynamic["loading"]["greatest_W_over_phi"] < 1
+
+
+def test_a_body_that_only_softens_is_said_to(tmp_path: Path) -> None:
+    """Fails if a ramp that ends past the peak of the load, before failure, leaves no word of it."""
+    summary = run(tmp_path, (5, 1), (2.5, 0.5), 0.5, '[["0 s", 0], ["1 s", "0.625 mm"]]')
+    assert re.search(r"nothing failed: .* near 1; the body has softened to gamma = 0\.9\d+; the", summary["verdict"])
+
+
+def test_runs_that_did_not_fail_are_compared(tmp_path: Path) -> None:
+    """Fails if a report needs the energies of an event of each of its runs."""
+    run(tmp_path, (2, 1), (1.0, 0.5), 0.5, '[["0 s", 0], ["1 s", "0.05 mm"]]', "both")
+    assert invoke_program("report", tmp_path / "out")[0] == 0
+    assert (tmp_path / "out" / "report.html").read_text().count(" nothing failed: ") == 2
 
 
 def test_a_body_of_which_nothing_is_left_is_a_result(tmp_path: Path) -> None:
