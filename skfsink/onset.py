@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -94,6 +94,7 @@ class StaticLoading:
     SOFT = 0.5, 0.02  # growth of the load, of that at the same gamma, and loss of it, past which a body softens
     FINE = 1 / 16, 0.01  # of the largest increment (or what settles the onset, if that is more), and of the way so
     # far: increments of a body that softens
+    OPEN = 0.04     # share of the stored energy by which the ledger may open in an increment, unless it is fine
     PERTURBED = 1e-3, 12  # change of gamma by which stability is tested, and passes for it
     OVER = 2.0      # least W/Phi of all points at which a body that has not failed is no body of this theory
     STRETCHED = 20.0  # greatest stretch to which a body is loaded
@@ -111,7 +112,8 @@ class StaticLoading:
         self.newton = Newton(momentum, free, self.controls.tolerance, self.controls.max_newton, threads)
         self.increment = 0.0      #: current load increment, as load time [s]; 0 before the first
         self.refused = ""         #: why the last increment was given up: "no equilibrium", "runs away", "passes",
-        #: "softens" (the increment is too long to follow the load over its peak) or "unstable"
+        #: "softens" (the increment is too long to follow the load over its peak), "open" (too long for the ledger) or
+        #: "unstable"
         self.unfailed = ""        #: why loading has ended without an onset; empty where there was one
         self.factor = 0.0         #: ratio of the last two changes of gamma in the iteration of the two fields
 
@@ -293,20 +295,28 @@ class StaticLoading:
                     self.momentum.force(state.u)
                     return
                 continue
-            ledger.work += 0.5 * float(np.sum((force + settled.force)[held] * (settled.u - state.u)[held]))
+            trial = replace(ledger)
+            trial.work += 0.5 * float(np.sum((force + settled.force)[held] * (settled.u - state.u)[held]))
             if dead is not None and before is not None:
-                ledger.work += dead.changed(before, 0.5 * (state.u + settled.u))
+                trial.work += dead.changed(before, 0.5 * (state.u + settled.u))
             intact = self.momentum.effective(state.gamma, state.deleted)
             self.momentum.set_gamma(settled.density.gamma, state.deleted)
-            ledger.drop(self.space.w, 0.5 * (W + settled.W), intact, self.momentum.gamma)
+            trial.drop(self.space.w, 0.5 * (W + settled.W), intact, self.momentum.gamma)
+            after = self.momentum.force(settled.u)  # at the settled gamma, as after a resume
+            trial.elastic, trial.loads = self.momentum.energy, self.momentum.loads
+            opened, allowed = abs(trial.balance - ledger.balance), self.OPEN * max(trial.elastic, ledger.elastic)
+            if opened > allowed and increment > self.FINE[0] * longest:
+                self.increment, self.refused = 0.5 * increment, "open"
+                self.momentum.set_time(state.grip)
+                continue
+            state.ledger = ledger = trial
             state.u, state.gamma, state.sink = settled.u, settled.density.gamma, settled.density.sink
             state.W_max = settled.W_max
-            force, W = self.momentum.force(state.u), settled.W  # at the settled gamma, as after a resume
+            force, W = after, settled.W
             if end == self.loading.knot(state.grip):
                 self.increment = 0.0  # the next one is by the rates that follow
             state.grip = state.time = end
             state.step += 1
-            ledger.elastic, ledger.loads = self.momentum.energy, self.momentum.loads
             yield state
 
     def _beyond(self, state: State, W: np.ndarray) -> bool:

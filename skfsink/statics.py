@@ -99,8 +99,11 @@ class Statics(StaticLoading):
         try:
             return self.newton.equilibrium(state.u, most=self.SNAP)[0]
         except ConvergenceError as error:
-            raise ConvergenceError(f"sweep {state.step + 1}: {error}; the history follows equilibria only: take "
-                                   f"another mesh, or --analysis dynamic") from None
+            cure = "take another mesh, or --analysis dynamic"
+            if self.momentum.dead is not None:
+                cure = "a body that tractions tear has none; take --analysis dynamic, or move a grip instead"
+            raise ConvergenceError(f"sweep {state.step + 1}: {error}; the history follows equilibria only: "
+                                   f"{cure}") from None
 
     def _follow(self, state: State, W: np.ndarray) -> bool:
         """Let the history follow `W` (ne, nq) where failure is nearest; True if points that fail had to wait.

@@ -184,8 +184,8 @@ def test_the_order_of_ramps_does_not_matter_to_an_elastic_body() -> None:
         states.append(body.state)
         np.testing.assert_allclose(body.state.u[side(body.space, "x+"), 0], 0.1, rtol=1e-12)
         assert body.state.grip == 4.5
-        with pytest.raises(ConvergenceError, match=r"^nothing moves after load time 4\.5 s"):
-            body.load()
+        body.load()
+        assert body.statics.unfailed == "nothing moves after load time 4.5 s" and body.state.grip == 4.5
         body.state.u, _ = body.statics.newton.equilibrium(body.state.u, 1e-10)
     np.testing.assert_allclose(states[0].u, states[1].u, atol=1e-9)
     assert states[0].ledger.work == pytest.approx(states[1].ledger.work, rel=1e-3)
@@ -346,7 +346,7 @@ def test_sweeps_under_traction_and_grips(tmp_path: Path) -> None:
     ledger, scale = state.ledger, sim.recorder.onset["elastic_energy"]
     assert sim.recorder.tracker.arrival is not None and ledger.released > 0.1 * scale
     assert abs(ledger.balance) < 1e-9 * scale
-    with pytest.raises(ConvergenceError, match="the history follows equilibria only"):
+    with pytest.raises(ConvergenceError, match="the history follows equilibria only: a body that tractions tear"):
         simulation(scene(PULL, analysis="quasistatic"), tmp_path / "dead").run()
 
 

@@ -111,6 +111,15 @@ def test_a_body_that_is_pressed_is_not_beside_tension() -> None:
     assert beside_theory(pressed, F, P) is None
 
 
+def test_the_ledger_of_a_body_that_is_low_along_its_load_closes() -> None:
+    """Fails if increments of 1 % of its width, a fifth of its height, are all taken."""
+    low = Loaded(scene((2, 20), (1.0, 20.0), 0.5))
+    assert low.way[0][0] == pytest.approx(0.1)
+    ledger = low.state.ledger
+    assert abs(ledger.balance) < 0.05 * ledger.elastic
+    assert low.loads.max() / 20 == pytest.approx(1.131, rel=2e-3)
+
+
 def test_an_increment_that_is_given_up_is_forgotten() -> None:
     """Fails if the density solver remembers the sink of an increment that was given up.
 
