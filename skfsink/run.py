@@ -37,7 +37,7 @@ __all__ = ["read_scene", "run_case"]
 log = logging.getLogger(__name__)
 SceneMaker = Callable[[dict[str, Any], Options], Scene]
 SCENE, SUMMARY = "scene.toml", "summary.json"
-LATER = ("merge_nodes",)  # parameters of cases that a scene.toml of an earlier version has not: they take their defaults
+LATER = ("merge_nodes",)  # parameters that a scene.toml of an earlier version has not; they take their defaults
 PARTS = ("dynamic", "quasistatic")  # folders of the two runs of both analyses
 
 
