@@ -142,6 +142,9 @@ def refuse(scene: Scene) -> None:
         if motion.unheld:
             raise ParameterError(f"nothing holds {motion.piece}: its nodes are in no grip, nor joined to a piece that "
                                  f"is held; merge nodes that coincide, or hold it at a boundary")
+    if not any(loading.speed(t) > 0.0 or loading.pull(t) > 0.0 for t in (0.0, *loading.knots)):
+        raise ParameterError("nothing loads the body: all its grips and tractions are still; give one of them a "
+                             "velocity (a rate), or a ramp that rises")
     if not scene.tractions and moves_as_a_whole(space, loading, label):
         whole = "the body" if count == 1 else f"each of the {count} pieces of the body, which are not joined,"
         raise ParameterError(f"the grips move {whole} as a whole and strain nothing: hold another boundary in the "

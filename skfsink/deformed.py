@@ -96,7 +96,10 @@ def bodies(space: Space, frames: Sequence[Frame], view: View,
     `colours` are nodal values (n,) for each frame; without them it is gamma.
     """
     drawn = [body(space, frame, view, colour) for frame, colour in zip(frames, colours or [None] * len(frames))]
-    box = np.array([np.min([b.box[0] for b in drawn], axis=0), np.max([b.box[1] for b in drawn], axis=0)])
+    left = [b.box for b in drawn if np.isfinite(b.box).all()] or [
+        body(space, Frame(0.0, "", np.zeros_like(space.X), np.ones(space.n_nodes), np.zeros(space.n_elements, bool)),
+             view).box]  # nothing is left in any frame
+    box = np.array([np.min([low for low, _ in left], axis=0), np.max([high for _, high in left], axis=0)])
     box += 0.02 * np.ptp(box, axis=0).max() * np.array([[-1], [1]])
     width, height = box[1] - box[0]
     return drawn, box, float(height / width)
@@ -132,7 +135,8 @@ def speed(frame: Frame) -> np.ndarray:
 def fastest(frames: Sequence[Frame]) -> float:
     """A round speed [m/s] that all but the fastest few of the nodes that hold stay below; frames may lack it."""
     speeds = [speed(frame)[frame.gamma >= CRACKED] for frame in frames if frame.v is not None]
-    top = float(np.quantile(np.concatenate(speeds), 0.999))
+    all_of_them = np.concatenate(speeds)
+    top = float(np.quantile(all_of_them, 0.999)) if all_of_them.size else 0.0
     unit = 10.0 ** np.floor(np.log10(max(top, 1e-9)))
     return float(unit * next(step for step in (1, 1.5, 2, 3, 4, 5, 6, 8, 10) if step * unit >= top))
 
@@ -170,7 +174,9 @@ def outer_facets(space: Space, elements: np.ndarray) -> np.ndarray:
 
 
 def extent(space: Space, elements: np.ndarray, x: np.ndarray, gamma: np.ndarray) -> np.ndarray:
-    """Least and greatest x, y (2, 2) of the pieces of the body that are not small fragments."""
+    """Least and greatest x, y (2, 2) of the pieces of the body that are not small fragments; NaN if nothing is left."""
+    if not len(elements):
+        return np.full((2, 2), np.nan)
     element, corner = np.nonzero(gamma >= SPENT)
     touches = csr_array((np.ones(len(element), np.int8), (element, space.conn[elements[element], corner])))
     _, piece = connected_components(touches @ touches.T, directed=False)

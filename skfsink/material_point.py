@@ -47,7 +47,8 @@ def beside_theory(scene: Scene, F: np.ndarray, P: np.ndarray) -> dict[str, Any] 
     names = {"uniaxial tension": (along, along**-0.5, along**-0.5), "plane strain": (along, 1.0, 1.0 / along),
              "equibiaxial tension": (along, along, along**-2)}
     name = next((name for name, path in names.items() if np.allclose(stretches, path, rtol=NEAR)), None)
-    if name is None:
+    pulled = np.linalg.norm(directions @ P.T, axis=1)  # on the planes across the principal directions
+    if name is None or pulled[2] > NEAR * pulled[0]:  # pressed: the stretches are those of tension
         return None
     path, law = PATHS[name], scene.sink_law
 
@@ -58,7 +59,7 @@ def beside_theory(scene: Scene, F: np.ndarray, P: np.ndarray) -> dict[str, Any] 
     top = int(np.argmin([weakness(stretch) for stretch in at]))
     best = minimize_scalar(weakness, bounds=(at[max(top - 1, 0)], at[min(top + 1, len(at) - 1)]), method="bounded",
                            options={"xatol": 1e-10})
-    strength, theory = float(np.linalg.norm(P @ directions[0])), -float(best.fun)
+    strength, theory = float(pulled[0]), -float(best.fun)
     return {"path": name, "stretch_at_greatest_load": along, "stretch_theory": float(best.x),
             "nominal_strength_MPa": strength, "nominal_strength_theory_MPa": theory,
             "difference": strength / theory - 1.0}

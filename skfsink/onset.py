@@ -92,7 +92,8 @@ class StaticLoading:
 
     SOUND = 0.999   # least gamma of a body that is as good as intact
     SOFT = 0.5, 0.02  # growth of the load, of that at the same gamma, and loss of it, past which a body softens
-    FINE = 1 / 16, 0.01  # of the largest increment, and of the way so far: increments of a body that softens
+    FINE = 1 / 16, 0.01  # of the largest increment (or what settles the onset, if that is more), and of the way so
+    # far: increments of a body that softens
     PERTURBED = 1e-3, 12  # change of gamma by which stability is tested, and passes for it
     OVER = 2.0      # least W/Phi of all points at which a body that has not failed is no body of this theory
     STRETCHED = 20.0  # greatest stretch to which a body is loaded
@@ -237,7 +238,9 @@ class StaticLoading:
         growth, loss = self._growth(state, settled, force)
         if growth > self.SOFT[0] and loss < self.SOFT[1]:
             return ""
-        if increment > min(self.FINE[0] * self._longest(state.grip), self.FINE[1] * self._age(state.grip + increment)):
+        way = self._age(state.grip + increment)
+        fine = max(self.FINE[0] * self._longest(state.grip), self.controls.onset_tolerance * way)
+        if increment > min(fine, self.FINE[1] * way):
             return "softens"
         return "" if growth > 0.0 or self.stable(state, settled) else "unstable"
 
@@ -283,7 +286,8 @@ class StaticLoading:
                 self.momentum.set_time(state.grip)
                 if state.step == 0 and self.increment < self.LEAST * longest:
                     raise ConvergenceError("the body finds no equilibrium under the smallest load increment")
-                if state.step and self.increment <= c.onset_tolerance * (self._age(state.grip) + self.increment):
+                if (state.step and self.refused != "softens"  # which has a shorter increment that is taken
+                        and self.increment <= c.onset_tolerance * (self._age(state.grip) + self.increment)):
                     self._doubt()
                     self.momentum.set_gamma(state.gamma, state.deleted)
                     self.momentum.force(state.u)

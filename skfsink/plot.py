@@ -57,9 +57,11 @@ def draw_body(ax: Axes, body: Body, title: str, scale: ScalarMappable = GAMMA_SC
     points = body.triangles.reshape(-1, 5)
     colour: Any = scale.to_rgba(points[:, 4])
     colour[:, :3] *= points[:, 3:4]
-    mesh = TriMesh(Triangulation(points[:, 0], points[:, 1], np.arange(len(points)).reshape(-1, 3)), rasterized=True)
-    mesh.set_facecolor(colour)
-    ax.add_collection(mesh, autolim=False)
+    if len(points):  # something is left of the body
+        corners = np.arange(len(points)).reshape(-1, 3)
+        mesh = TriMesh(Triangulation(points[:, 0], points[:, 1], corners), rasterized=True)
+        mesh.set_facecolor(colour)
+        ax.add_collection(mesh, autolim=False)
     ax.add_collection(LineCollection(list(body.outline), colors="0.35", linewidths=0.4), autolim=False)
     ax.set_title(title)
 

@@ -38,7 +38,7 @@ class Recorder:
     moments: frame number of each key moment: onset, branching, arrival, end.
     onset, at_arrival: figures noted at those moments.
     greatest: load, displacement, mean deformation gradient F and nominal stress P [MPa] where the load was greatest
-        while the body was loaded.
+        in amount while the body was loaded.
     loading_frames: time and label of the frames of the loading.
     """
 
@@ -94,7 +94,7 @@ class Recorder:
         row = self._row(state, reaction, self.tips, 0.0)
         self.history.append(row)
         load = row["reaction_N_per_mm"]
-        if load > self.greatest.get("load", -np.inf):
+        if abs(load) > abs(self.greatest.get("load", 0.0)):  # pushed or pulled, whichever was more
             self.greatest = {"load": load, "displacement_mm": row["grip_displacement_mm"],
                              "F": mean_deformation(self.momentum, state.u).tolist(),
                              "P": mean_stress(self.momentum.space, reaction).tolist()}

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from .checkpoint import load_checkpoint, load_state
 from .checks import refuse
@@ -194,13 +194,13 @@ def _run_both(scene: Scene, folder: Path, display: Display, resume: bool,
             _begin(folder / analysis, overwrite=True)
         _write_scene(scene, folder)
     parts: dict[str, Result] = {}
-    onset: State | None = None
+    onset: Onset | None = None
     for analysis, part in scenes.items():
         if not begun[analysis]:
             _begin(folder / analysis, overwrite=True)
         parts[analysis] = _run_one(part, folder / analysis, display, begun[analysis], onset, notes)
         if parts[analysis].failed:
-            onset = load_state(folder / "dynamic" / Simulation.ONSET, scenes["dynamic"].fingerprint)
+            onset = _onset(folder / "dynamic", scenes["dynamic"].fingerprint)
     display.phase("output")
     if all(part.failed for part in parts.values()):
         draw_comparison(parts["dynamic"], parts["quasistatic"], folder)
@@ -212,7 +212,19 @@ def _run_both(scene: Scene, folder: Path, display: Display, resume: bool,
     return Result(folder, scene, summary, first.history, first.state, parts)
 
 
-def _run_one(scene: Scene, folder: Path, display: Display, resume: bool, onset: State | None = None,
+class Onset(NamedTuple):
+    """A state at the onset, and what :attr:`.Recorder.greatest` was on the way to it."""
+
+    state: State
+    greatest: dict[str, Any]
+
+
+def _onset(folder: Path, fingerprint: str) -> Onset:
+    *_, extra = load_checkpoint(folder / Simulation.CHECKPOINT, fingerprint)
+    return Onset(load_state(folder / Simulation.ONSET, fingerprint), extra["recorder"].get("greatest", {}))
+
+
+def _run_one(scene: Scene, folder: Path, display: Display, resume: bool, onset: Onset | None = None,
              notes: Sequence[str] = ()) -> Result:
     simulation = Simulation(scene, folder, display, resume)
     with simulation.notes:
@@ -226,7 +238,7 @@ def _run_one(scene: Scene, folder: Path, display: Display, resume: bool, onset: 
         display.say(f"note: {text}")
     display.say(f"{scene.title}, mesh {scene.sample.name}: {space.n_elements} elements, {int(simulation.free.sum())} + "
                 f"{space.n_nodes} unknowns; {scene.controls.analysis} analysis in {folder}")
-    state = simulation.run(None if onset is None else onset_copy(onset))
+    state = simulation.run() if onset is None else simulation.run(onset_copy(onset.state), onset.greatest)
     display.phase("output")
     display.update(0.0, "")
     draw_run(scene, folder, simulation.recorder)

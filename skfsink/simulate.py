@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import time
+from collections.abc import Mapping
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -89,8 +90,11 @@ class Simulation:
             self._restore(*stored)
 
     # --- the phases ---
-    def run(self, onset: State | None = None) -> State:
-        """Run to the end from where the state is; `onset` is a state already loaded to the onset."""
+    def run(self, onset: State | None = None, greatest: Mapping[str, Any] | None = None) -> State:
+        """Run to the end from where the state is.
+
+        `onset` is a state already loaded to the onset, `greatest` what :attr:`.Recorder.greatest` was on the way.
+        """
         with Interrupt() as interrupt, self.notes, one_thread_of_openblas(), closing(self.recorder.series), \
                 closing(self.recorder.loading_series):
             self._interrupt = interrupt
@@ -100,6 +104,7 @@ class Simulation:
                 if onset is None:
                     self._load()
                 else:
+                    self.recorder.greatest = dict(greatest or {})
                     self._adopt(onset)
                 if self.unfailed:
                     self.recorder.unfailed(self.state)
@@ -113,7 +118,8 @@ class Simulation:
                 else:
                     self._integrate()
                 self.state.phase = "done"
-                check_arrival(self.scene, self.recorder.tracker)
+                if not self.dissolved:
+                    check_arrival(self.scene, self.recorder.tracker)
             self._lap("event")
             self.checkpoint()
             if interrupt.heeded():

@@ -236,3 +236,12 @@ def test_a_deck_in_metres_is_refused_before_a_file_is_touched(tmp_path: Path):
     status, err, _ = invoke_program("run", tmp_path / "deck.toml", "--out", tmp_path / "run", "--quiet")
     assert status == 2 and "the body is 0.004 mm across" in err and err.count("\n") == 1
     assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize("still", [0.0, Ramp((0.0, 1.0), (0.0, 0.0))])
+def test_a_body_that_nothing_loads_is_refused(still: float | Ramp):
+    """Fails if a deck in which everything is held is a result: a body that did not fail at W/Phi = 0."""
+    held = dataclasses.replace(scene(), grips=(Grip("bottom", (0.0, 0.0)), Grip("top", (None, still))))
+    with pytest.raises(ParameterError, match="nothing loads the body"):
+        checks.refuse(held)
+    checks.refuse(dataclasses.replace(held, tractions=(Traction("top", (1e-3, 0.0)),)))

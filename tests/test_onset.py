@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import meshio
@@ -18,6 +19,7 @@ from skfsink.hht import HHT, HHTControls
 from skfsink.indicators import greatest_stretch
 from skfsink.loads import Grip, Ramp
 from skfsink.material import AAA, SinkLaw
+from skfsink.material.library import MATERIALS
 from skfsink.material_point import beside_theory, mean_deformation, mean_stress
 from skfsink.meshing import write_mesh
 from skfsink.momentum import Momentum
@@ -84,6 +86,28 @@ def test_a_long_strip_is_loaded_to_its_last_stable_state(monkeypatch: pytest.Mon
     assert 30 < len(point.way) < 200
     monkeypatch.setattr(Statics, "stable", lambda *_: True)
     assert Loaded(scene((20, 2), (10.0, 1.0), 0.25)).loads[-1] < 0.985 * strip.loads[-1]
+
+
+def test_a_body_that_is_stretched_far_is_followed_over_its_peak() -> None:
+    """Fails if the loading ends where increments are too long for a softening body: 7 % below its strength.
+
+    The way to failure is long in Gent's law, and the interval that settles the onset longer than the finest increment.
+    """
+    law = MATERIALS["gent"](bulk_modulus=5e4)  # type: ignore[call-arg]
+    sheet = replace(scene((8, 2), (4.0, 1.0), 0.5), material=law, sink_law=SinkLaw(15.62, m=10, length_scale=0.5))
+    body = Loaded(sheet)
+    assert body.loads[-1] < body.loads.max()
+    found = beside_theory(sheet, *body.strain[int(np.argmax(body.loads))])
+    assert found is not None and abs(found["difference"]) < 2e-3
+
+
+def test_a_body_that_is_pressed_is_not_beside_tension() -> None:
+    """Fails if uniaxial compression is compared with equibiaxial tension, whose stretches it has."""
+    pressed = scene((4, 1), (4.0, 1.0), 1.0, pull=-SPEED)
+    body = Loaded(pressed)
+    F, P = body.strain[int(np.argmax(body.loads))]
+    assert np.allclose(np.linalg.svd(F)[1], (F[1, 1], F[1, 1], F[1, 1] ** -2), rtol=0.01)
+    assert beside_theory(pressed, F, P) is None
 
 
 def test_an_increment_that_is_given_up_is_forgotten() -> None:
@@ -193,6 +217,7 @@ mesh = "strip.vtu"
 length_scale = "{l} mm"
 element = "planestress"
 analysis = "{analysis}"
+event_time = "{time}"
 [[grips]]
 boundary = "left"
 x = 0
@@ -206,7 +231,7 @@ x = {pull}
 
 
 def run(folder: Path, shape: tuple[int, int], size: tuple[float, float], l: float, pull: str,
-        analysis: str = "dynamic") -> dict:
+        analysis: str = "dynamic", head: str = HEAD, event_time: str = "0.2 ms") -> dict:
     """Summary of the run of a deck."""
     mesh = grid("quad", shape, size)
     points = np.column_stack([mesh.p.T, np.zeros(mesh.p.shape[1])])
@@ -215,7 +240,7 @@ def run(folder: Path, shape: tuple[int, int], size: tuple[float, float], l: floa
     turned = (b - a)[:, 0] * (c - b)[:, 1] - (b - a)[:, 1] * (c - b)[:, 0] < 0
     quads = np.where(turned[:, None], quads[:, ::-1], quads)
     write_mesh(folder / "strip.vtu", meshio.Mesh(points, [("quad", quads)]))
-    (folder / "deck.toml").write_text(HEAD.format(l=l, pull=pull, analysis=analysis))
+    (folder / "deck.toml").write_text(head.format(l=l, pull=pull, analysis=analysis, time=event_time))
     status, said, _ = invoke_program("run", folder / "deck.toml", "--out", folder / "out", "--quiet")
     assert (status, said) == (0, "")
     found: dict = json.loads((folder / "out" / "summary.json").read_text())
@@ -243,6 +268,38 @@ def test_loading_and_unloading_is_a_result(tmp_path: Path) -> None:
     assert invoke_program("resume", folder, "--quiet")[0] == 0
     assert json.loads((folder / "summary.json").read_text())["verdict"] == summary["verdict"]
     assert (folder / "history.csv").read_bytes() == history
+
+
+def test_the_greatest_load_is_that_of_its_amount(tmp_path: Path) -> None:
+    """Fails if a push before the pull that breaks the body is its strength, since it has the other sign."""
+    summary = run(tmp_path, (5, 1), (2.5, 0.5), 0.5, '[["0 s", 0], ["1 s", "-0.4 mm"], ["2 s", 0], ["3 s", "1 mm"]]',
+                  event_time="1 us", head=HEAD.replace("[[grips]]", """[[grips]]
+boundary = "left"
+x = [["0 s", 0], ["3 s", "0.1 mm"], ["4 s", 0]]
+[[grips]]""", 1).replace('boundary = "left"\nx = 0', 'boundary = "bottom"\ny = 0'))
+    loading = summary["loading"]
+    assert loading["greatest_load"] == pytest.approx(-1.131 * 0.5, rel=2e-3)
+
+
+def test_both_analyses_report_the_same_strength(tmp_path: Path) -> None:
+    """Fails if the analysis that starts from the other's onset takes the load there for the greatest of the way."""
+    both = run(tmp_path, (10, 2), (5.0, 1.0), 0.5, '"1e-3 mm/s"', "both", event_time="1e-6 s")
+    dynamic, quasistatic = (both[name] for name in ("dynamic", "quasistatic"))
+    greatest = ("greatest_load", "displacement_at_greatest_load_mm")
+    assert [dynamic["loading"][name] for name in greatest] == [quasistatic["loading"][name] for name in greatest]
+    assert quasistatic["loading"]["greatest_load"] > 1.005 * quasistatic["onset"]["reaction_N_per_mm"]
+    assert quasistatic["material_point"] == dynamic["material_point"]
+
+
+def test_a_body_of_which_nothing_is_left_is_a_result(tmp_path: Path) -> None:
+    """Fails if frames without an element cannot be drawn: under a dead load an even strip is spent to the last."""
+    pull = '[["0 s", 0], ["10 s", "10 MPa"]]'
+    summary = run(tmp_path, (4, 1), (2.0, 0.5), 0.5, pull, "quasistatic", head=HEAD.replace(
+        '[[grips]]\nboundary = "right"', '[[tractions]]\nboundary = "right"'))
+    assert summary["verdict"].startswith("failed everywhere at once")
+    assert summary["deleted_elements"] == summary["elements"]
+    assert (tmp_path / "out" / "density.png").stat().st_size > 5000
+    assert not any("without a first arrival" in text for text in summary["warnings"])
 
 
 def test_a_material_point_fails_everywhere_at_once(tmp_path: Path) -> None:
