@@ -37,6 +37,7 @@ __all__ = ["read_scene", "run_case"]
 log = logging.getLogger(__name__)
 SceneMaker = Callable[[dict[str, Any], Options], Scene]
 SCENE, SUMMARY = "scene.toml", "summary.json"
+LATER = ("merge_nodes",)  # parameters that a scene.toml of an earlier version has not; they take their defaults
 PARTS = ("dynamic", "quasistatic")  # folders of the two runs of both analyses
 
 
@@ -109,7 +110,7 @@ def read_scene(folder: Path) -> Scene:
         case = str(read_toml(path)["case"])
         module = importlib.import_module(f"skfsink.cases.{case}")
         stored = read_parameters(folder, case)
-        own = {name: stored.pop(name, p.default)
+        own = {name: stored.pop(name, p.default) if name in LATER else stored.pop(name)
                for name, p in inspect.signature(getattr(module, case)).parameters.items() if name != "options"}
         options = replace(Options(), **stored, corridor=_corridor(folder), kept=_kept(folder, own))
     except (ModuleNotFoundError, ValueError, AttributeError, KeyError, TypeError) as error:

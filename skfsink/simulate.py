@@ -18,10 +18,10 @@ from .direct import one_thread_of_openblas
 from .energy import Ledger
 from .errors import CheckpointError, SkfsinkError
 from .explicit import Explicit
-from .guards import Notes
 from .hht import HHT
 from .history import history_units
 from .momentum import Momentum
+from .notes import Notes
 from .places import check_arrival, said
 from .progress import Display, Interrupt
 from .recorder import Recorder

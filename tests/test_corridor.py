@@ -18,8 +18,8 @@ from skfsink import corridor
 from skfsink.cases.single_edge_notch import single_edge_notch
 from skfsink.corridor import Corridor, corridor_report, lay_corridor
 from skfsink.errors import MeshError, OutputError
-from skfsink.guards import Notes
 from skfsink.meshing import SizeField
+from skfsink.notes import Notes
 from skfsink.options import Options
 from skfsink.progress import Display
 from skfsink.sample import shape_mesh

@@ -15,9 +15,9 @@ from guarded import NOTCHED, SHARP, Watched, scene
 from skfsink.energy import Ledger
 from skfsink.errors import InstabilityError
 from skfsink.explicit import ExplicitControls
-from skfsink.guards import Notes
 from skfsink.hht import HHTControls
 from skfsink.material import AAA
+from skfsink.notes import Notes
 from skfsink.sample import Sample
 from skfsink.scene import Scene
 from skfsink.space import Space

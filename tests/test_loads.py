@@ -27,6 +27,7 @@ from skfsink.simulate import Interrupted, Simulation
 from skfsink.space import Space
 from skfsink.state import State
 from skfsink.statics import Statics, StaticsControls
+from skfsink.verdict import verdict
 
 TOUGH = SinkLaw(phi=1e3)  # never reached: gamma stays 1
 FINE = {"force_tolerance": 1e-8, "correction_tolerance": 1e-8, "gamma_tolerance": 1e-7, "max_iterations": 40}
@@ -185,7 +186,7 @@ def test_the_order_of_ramps_does_not_matter_to_an_elastic_body() -> None:
         np.testing.assert_allclose(body.state.u[side(body.space, "x+"), 0], 0.1, rtol=1e-12)
         assert body.state.grip == 4.5
         body.load()
-        assert body.statics.unfailed == "nothing moves after load time 4.5 s" and body.state.grip == 4.5
+        assert body.statics.unfailed == "nothing moves after load time 4.5 s"
         body.state.u, _ = body.statics.newton.equilibrium(body.state.u, 1e-10)
     np.testing.assert_allclose(states[0].u, states[1].u, atol=1e-9)
     assert states[0].ledger.work == pytest.approx(states[1].ledger.work, rel=1e-3)
@@ -206,12 +207,11 @@ def test_knots_are_hit_and_slow_ramps_do_not_blur_the_onset() -> None:
 
 
 def test_loads_that_end_without_an_onset_are_reported() -> None:
-    """Fails if a body that holds is loaded for ever, or ends without saying when and how near it came."""
+    """Fails if a body that holds is loaded for ever, or ends without saying when."""
     body = Loaded(notched(9), (Grip("y-", (0.0, 0.0)),), (Traction("y+", (0.0, Ramp((0.0, 2.0), (0.0, 0.05)))),),
                   law=SinkLaw())
-    with pytest.raises(ConvergenceError, match=r"^nothing moves after load time 2 s, and nothing has failed: the "
-                                               r"greatest W/Phi is 0\.0\d+, .*let a ramp go further"):
-        body.load()
+    body.load()
+    assert body.statics.unfailed == "nothing moves after load time 2 s"
     assert body.state.grip == 2.0 and body.statics.loading.knot(2.0) == np.inf
 
 
@@ -441,5 +441,7 @@ def test_tractions_need_facets_and_as_many_components_as_the_mesh() -> None:
 def test_scene_in_which_nothing_moves_says_so(tmp_path: Path) -> None:
     """Fails if a body without load divides by zero, or is loaded for ever."""
     still = replace(scene(), sample=PLAIN)
-    with pytest.raises(ConvergenceError, match=r"^nothing moves after load time 0 s, and nothing has failed"):
-        simulation(still, tmp_path).run()
+    run = simulation(still, tmp_path)
+    assert run.run().phase == "done"
+    assert verdict(still, run).startswith("nothing failed: the greatest W/Phi was 0, at ")
+    assert verdict(still, run).endswith("the loading ended because nothing moves after load time 0 s")

@@ -169,6 +169,31 @@ def test_loading_without_failure_has_limits() -> None:
     assert 20 < greatest_stretch(strong.sample.space, body.state.u) < 21
 
 
+def test_a_body_that_should_have_failed_is_not_loaded_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fails if a defect that keeps gamma at 1 lets a body be loaded without end: all points are far past failure."""
+    monkeypatch.setattr(DensitySolver, "update", lambda self, W_max, before, tolerance=None: before)
+    body = Loaded(scene((4, 1), (4.0, 1.0), 1.0))
+    assert body.statics.unfailed.startswith("every point is past its energy limiter, by W/Phi = 2.")
+
+
+def test_factors_kept_from_an_increment_given_up_do_not_change_the_equilibrium() -> None:
+    """Fails if factors made far away lead Newton's method to another equilibrium than none: within its tolerance."""
+    ends = at_onset(box("quad", 6))
+    state = ends.fresh()
+    found, counts = [], []
+    for far in (False, True):
+        statics = Statics(ends.momentum, ends.density, ends.free, ends.velocity, StaticsControls(tolerance=1e-9))
+        ends.momentum.set_gamma(state.gamma, state.deleted)
+        if far:
+            statics.newton.predict(0.98 * state.u, np.zeros_like(state.u))  # as for an increment that is given up
+            assert "kept_u" in statics.newton.memory()
+        counts.append(statics.factorisations)
+        found.append(statics.equilibrium(state.u)[0])
+        counts.append(statics.factorisations)
+    assert counts == [0, 1, 1, 1]  # the factors of far away have served
+    assert 0 < np.abs(found[0] - found[1]).max() < 1e-7 * np.abs(state.u).max()
+
+
 def test_points_wait_only_for_points_that_fail() -> None:
     """Fails if points wait for one that failed long ago and still bears the greatest energy: sweeps never end."""
     ends = at_onset(box("quad", 6))

@@ -192,8 +192,12 @@ def test_density_equals_the_form_and_keeps_its_bounds(kind: str) -> None:
     assert 0 < gamma.min() < 0.1 and gamma.max() <= 1
     consistent = DensitySolver(space, laws[0], "consistent", regions=regions)
     mild = np.minimum(W, 0.05)
-    form = density_forms(0.3, 1e-15).matrix.assemble(space.gamma_basis, history=consistent._history(mild))
-    close(consistent.pattern.matrix(consistent._assemble(1 / (consistent._history(mild) + 1e-15))), form)
+    H = laws[0].history(mild)
+    for region in regions:
+        H[region.elements] = region.sink_law.history(mild[region.elements])
+    np.testing.assert_array_equal(consistent.coefficients(mild), 1 / (H + 1e-15))
+    form = density_forms(0.3, 1e-15).matrix.assemble(space.gamma_basis, history=H)
+    close(consistent.pattern.matrix(consistent._assemble(consistent.coefficients(mild))), form)
     for e in (*regions[0].elements[:1], *regions[1].elements[:1]):
         law = regions[0].sink_law if e in regions[0].elements else regions[1].sink_law
         assert (solver.phi[e, 0], solver.failure_energy[e]) == (law.phi, law.failure_energy)

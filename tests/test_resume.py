@@ -167,11 +167,11 @@ def stopped(mesh: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     top = tmp_path_factory.mktemp("stopped")
     shutil.copy(mesh, top)
     short = ["--mesh", top / "plate.vtu", *SMALL, "--event-time", "1e-5", "--checkpoint-every", "1e-9"]
-    assert forked([*short, "--out", top / "run"], 100)[0] == -9
+    assert forked([*short, "--out", top / "run"], 145)[0] == -9
     assert forked([*short, "--out", top / "other", "--phi", "0.2"], 100)[0] == -9
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(skfsink.run, "draw_run", lambda *_: None)
-        assert forked([*short, "--out", top / "both", "--analysis", "both"], 205)[0] == -9
+        assert forked([*short, "--out", top / "both", "--analysis", "both"], 275)[0] == -9
     assert (top / "both" / "quasistatic" / "checkpoint.npz").exists()
     return top
 

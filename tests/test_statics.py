@@ -158,7 +158,6 @@ def test_loading_resumes_to_the_same_bits():
             break
     other = Body.of(notched(9))
     other.statics.restore(parts.statics.memory())
-    other.statics.density.restore(parts.statics.density.memory())
     for _ in other.statics.load(parts.state):
         pass
     np.testing.assert_array_equal(whole.state.u, parts.state.u)
@@ -210,9 +209,9 @@ def test_arrested_crack_is_driven_on_by_the_grips():
     assert state.grip == pytest.approx(start * 1.005**2, rel=1e-12)
     assert state.ledger.work > 0
     assert abs(state.ledger.balance) < 1e-4 * state.ledger.initial
-    with pytest.raises(ConvergenceError, match="has not crossed"):
-        for _ in statics.propagate(state, limit=1.001):
-            pass
+    for _ in statics.propagate(state, limit=1.001):
+        pass
+    assert statics.arrested == "the grips are at 1.001 times their way to the onset"
 
 
 @pytest.mark.parametrize(("name", "value"), [("tolerance", 0.0), ("increment", 0.6), ("onset_tolerance", -1.0),
@@ -277,7 +276,6 @@ def test_sweeps_resume_to_the_same_bits():
                 break
         other = Body.of(notched(9))
         other.statics.restore(parts.statics.memory())
-        other.statics.density.restore(parts.statics.density.memory())
         parts = Body(other.momentum, other.statics, parts.state)
     np.testing.assert_array_equal(whole.state.u, parts.state.u)
     np.testing.assert_array_equal(whole.state.gamma, parts.state.gamma)
