@@ -138,7 +138,8 @@ class Guard:
         error, allowed = state.ledger.error(state.ledger.elastic), self.scene.controls.balance_tolerance
         if not error <= allowed:
             raise InstabilityError(f"the ledger of the loading is open by {error:.2%} of the stored energy, allowed "
-                                   f"{allowed:.2%}: take smaller load increments, or raise --balance-tolerance")
+                                   f"{allowed:.2%}: the body snaps or buckles on its way; hold it sideways, or raise "
+                                   f"--balance-tolerance")
         self._check_shape(state)
 
     def _even_share(self, state: State) -> float:
