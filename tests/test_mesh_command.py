@@ -17,7 +17,7 @@ from skfsink.mesh_files.convert import converted
 from skfsink.mesh_files.quality import Quality
 from skfsink.mesh_files.split import split
 from skfsink.mesh_files.tidy import drop_empty, notes_of
-from skfsink.meshing import scaled_jacobian, write_mesh
+from skfsink.meshing import read_mesh, scaled_jacobian, write_mesh
 from skfsink.sample import Sample, file_sample, mesh_sample
 
 CUBE = np.array([[i, j, k] for k in (0, 1) for j in (0, 1) for i in (0, 1)])
@@ -496,13 +496,24 @@ def test_second_order_without_a_split(tmp_path: Path) -> None:
     assert len(made.points) == 4 and "4 middle node(s) of quad8" in notes_of(made)[0]
 
 
+def test_names_as_people_write_them(tmp_path: Path) -> None:
+    """Fails if names of sets go into the XML of a VTU file as they are, or depend on the encoding of the machine."""
+    mesh, names = triangles(), ['right "half"', "A & B", "R<1>", "oben ä", "&amp;", "it's"]
+    none = [np.zeros(0, np.int64)] * (len(mesh.cells) - 1)
+    mesh.cell_sets = {name: [np.arange(k + 1), *none] for k, name in enumerate(names)}
+    write_mesh(tmp_path / "names.vtu", mesh)
+    (tmp_path / "names.vtu").read_bytes().decode("ascii")
+    assert {name: len(own[0]) for name, own in read_mesh(tmp_path / "names.vtu").cell_sets.items()} == {
+        name: k + 1 for k, name in enumerate(names)}
+
+
 @pytest.mark.parametrize(("arguments", "said"), [
     (["in.vtu", "out.msh"], "OUT must be a VTU file"), (["in.vtu", "in.vtu"], "is the file that is read"),
     (["in.vtu", "in.vtu", "--overwrite"], "is the file that is read"),
     (["in.vtu", "link.vtu", "--overwrite"], "is the file that is read"),
     (["in.vtu", "there.vtu"], "there is a file there.vtu already"),
     (["no.vtu", "out.vtu"], "there is no mesh file no.vtu"),
-    (["in.vtu", "out.vtu", "--from", "kg"], "from must be a quantity in mm"),
+    (["in.vtu", "out.vtu", "--from", "kg"], "from must be a unit of length, such as m or inch; got 'kg'"),
     (["in.vtu", "out.vtu", "--from", "m", "--merge-nodes", "1 s"], "merge-nodes must be a quantity in mm"),
     (["in.vtu", "out.vtu", "--merge-nodes", "-1"], "merge_nodes must be"),
     (["in.vtu", "out.vtu", "--merge-nodes", "1"], "would collapse element"),
@@ -510,6 +521,8 @@ def test_second_order_without_a_split(tmp_path: Path) -> None:
     (["in.vtu", "out.vtu", "--boundary", "a=w:1"], "boundary must be NAME=x:1.5"),
     (["in.vtu", "out.vtu", "--boundary", "a=x:min mm"], "boundary a must be a quantity in mm"),
     (["in.vtu", "out.vtu", "--boundary", "a=x:3"], "no edge on the outside lies in x = 3 mm; the body is between 0"),
+    (["in.vtu", "out.vtu", "--boundary", "a=z:max"], "boundary a: a plane body has no edges in z"),
+    (["in.vtu", "out.vtu", "--from", "2"], "from must be a unit of length, such as m or inch; got '2'"),
     (["in.vtu", "out.vtu", "--boundary", "top=x:0"], "has a set 'top' of its own"),
     (["empty.vtu", "out.vtu"], "has no elements: it has line"), (["in.vtu"], "out"), (["in.vtu", "out.vtu", "x"], "x")])
 def test_what_the_command_refuses(arguments: list[str], said: str, tmp_path: Path,

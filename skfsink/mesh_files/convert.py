@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import MeshError, ParameterError
 from ..mesh_file import EXTENT, check_mesh, one_line, read_mesh_file
-from ..units import in_unit
+from ..units import LONGEST, in_unit
 from .collapsed import uncollapsed
 from .orientation import FACETS, oriented
 from .pieces import merged, shortest
@@ -42,7 +42,10 @@ def converted(path: Path, unit: str = "mm", merge_nodes: float = 0.0, boundaries
         There is no such unit, or a boundary is not of that form.
     """
     planes = [_plane(text) for text in boundaries]
-    factor = in_unit("from", f"1 {unit}", "mm")
+    try:
+        factor = in_unit("from", f"1 {unit}", "mm")
+    except ParameterError:
+        raise ParameterError(f"from must be a unit of length, such as m or inch; got {unit[:LONGEST]!r}") from None
     mesh, name = read_mesh_file(path, raw=True), one_line(str(path))
     if not body_blocks(mesh):
         raise MeshError(f"mesh {name} has no elements: it has "
@@ -95,6 +98,9 @@ def _add_planes(mesh: meshio.Mesh, planes: Sequence[tuple[str, int, str | float]
     for name, axis, place in planes:
         if name in mesh.point_sets.keys() | mesh.cell_sets.keys():
             raise ParameterError(f"the mesh has a set {name!r} of its own: take another name for the boundary")
+        if kind == "quad" and axis == 2:
+            raise ParameterError(f"boundary {name}: a plane body has no edges in z that are not all its edges: take a "
+                                 f"place in x or y")
         x = mesh.points[:, axis]
         at = float(x.min() if place == "min" else x.max()) if isinstance(place, str) else place
         on = (np.abs(x - at) <= near)[facets].all(axis=1)
