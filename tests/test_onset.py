@@ -14,6 +14,7 @@ from bodies import at_onset, box, grid
 from plates import invoke_program
 
 import skfsink
+from skfsink.cases.symmetric_double_edge_notch import symmetric_double_edge_notch
 from skfsink.density import Density, DensitySolver
 from skfsink.gauge import Gauge
 from skfsink.hht import HHT, HHTControls
@@ -24,6 +25,7 @@ from skfsink.material.library import MATERIALS
 from skfsink.material_point import beside_theory, mean_deformation, mean_stress
 from skfsink.meshing import write_mesh
 from skfsink.momentum import Momentum
+from skfsink.options import Options
 from skfsink.regions import Region
 from skfsink.sample import Sample
 from skfsink.scene import Controls, Scene
@@ -358,3 +360,13 @@ def test_a_material_point_fails_everywhere_at_once(tmp_path: Path) -> None:
     assert abs(summary["material_point"]["difference"]) < 3e-3  # k/mu is 400 here, the theory incompressible
     assert summary["loading"]["greatest_load"] == pytest.approx(1.131, rel=1e-3)
     assert (tmp_path / "out" / "energies.png").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("front", [0.95, 1.0])
+def test_sweeps_end_whatever_share_of_points_may_fail(front: float, tmp_path: Path) -> None:
+    """Fails if points wait for ever: this scene made 41,000 sweeps without any change."""
+    result = symmetric_double_edge_notch(mesh="coarse", options=Options(
+        analysis="quasistatic", front=front, out=tmp_path / "out", quiet=True))
+    assert result.summary["verdict"].startswith("cracked and separated")
+    assert result.state.step < 1000
