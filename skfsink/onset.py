@@ -225,7 +225,7 @@ class StaticLoading:
             There is no equilibrium under the smallest increment.
         """
         c, dead = self.controls, self.momentum.dead
-        ledger = state.ledger
+        ledger, self.unfailed = state.ledger, ""
         held = ~self.free.reshape(state.u.shape)
         self.momentum.set_time(state.grip)
         self.momentum.set_gamma(state.gamma, state.deleted)

@@ -48,7 +48,7 @@ class Statics(StaticLoading):
             There is no equilibrium, as under dead loads alone; or points wait that are never let go.
         """
         ledger, dead = state.ledger, self.momentum.dead
-        furthest, idle = limit * self.way(state.grip), 0
+        furthest, idle, self.arrested = limit * self.way(state.grip), 0, ""
         self.momentum.set_time(state.grip)
         if state.step == 0:
             self.momentum.set_gamma(state.gamma, state.deleted)

@@ -159,6 +159,8 @@ def test_increments_are_refined_only_where_a_body_softens() -> None:
     assert len(body.way) == 10
     assert body.loads[4] == body.loads.max() > 0
     assert body.statics.unfailed == "nothing moves after load time 2 s"
+    again = State.intact(body.momentum.space)
+    assert len(list(body.statics.load(again))) == 10  # another body is not ended by what became of this one
     assert abs(body.loads[-1]) < 1e-6
 
 
