@@ -65,6 +65,8 @@ class Factorization:
         One that is not is factorised all the same, unless `indefinite` is False.
         """
         self.count += 1
+        if not self.pattern.size:  # every node is held: nothing is unknown
+            return True
         self._matrix = self.pattern.matrix(data)
         if self.backend == "superlu":
             whole = csc_array(self.pattern.symmetric(data))
@@ -85,6 +87,8 @@ class Factorization:
         ConvergenceError
             The residual stays above 1000 times the tolerance: the matrix is singular to rounding.
         """
+        if not b.size:
+            return b
         x = self.apply(b)
         scale = float(np.linalg.norm(b))
         if scale == 0.0:
@@ -103,6 +107,8 @@ class Factorization:
 
     def apply(self, b: np.ndarray) -> np.ndarray:
         """Forward and backward substitution, the residual not looked at."""
+        if not b.size:
+            return b
         if self.backend == "superlu":
             assert self._lu is not None
             return self._lu.solve(b)

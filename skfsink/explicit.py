@@ -261,7 +261,8 @@ class Explicit:
             self._indicator0, self._last_estimate, ratio = indicator, state.step, 1.0
             self.estimates += 1
             self._urgent = False
-        self.dt = float(c.courant * 2.0 / (self._omega * np.sqrt(max(1.0, ratio))))
+        swings = self._omega > 0.0  # else every node is held
+        self.dt = float(c.courant * 2.0 / (self._omega * np.sqrt(max(1.0, ratio)))) if swings else self._interval
         if not c.gamma_every:
             self.dt = min(self.dt, self._interval)  # in plane stress the stable step may be longer
 

@@ -24,6 +24,8 @@ def highest_frequency(momentum: Momentum, pattern: Pattern, free: np.ndarray, u:
     Lanczos on the mass-scaled tangent of the deformed, damaged body. `start` is a starting vector, best the result of
     the last call. The estimate approaches from below, by about `tolerance`.
     """
+    if not pattern.size:  # every node is held: nothing swings
+        return 0.0, np.zeros(0)
     indptr, indices = pattern.indptr.view(np.uint32), pattern.indices.view(np.uint32)
     data = momentum.tangent(pattern, u)
     _scale(indptr, indices, data, 1.0 / np.sqrt(np.repeat(mass, momentum.space.dim)[free]))

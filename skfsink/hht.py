@@ -25,7 +25,7 @@ import numpy as np
 from .deletion import delete_failed
 from .density import Density, DensitySolver
 from .direct import Factorization
-from .errors import ConvergenceError
+from .errors import ConvergenceError, ParameterError
 from .hht_controls import HHTControls
 from .inertia import Inertia
 from .loading import Loading
@@ -81,6 +81,9 @@ class HHT:
         self.momentum, self.density, self.deletion = momentum, density, deletion
         self.controls = controls or HHTControls()
         self.space = momentum.space
+        if not free.any():
+            raise ParameterError("every node is held in every direction, so that nothing can move by itself: take "
+                                 "--integrator explicit, or --analysis quasistatic")
         self.free = free
         self._held = ~free.reshape(-1, self.space.dim)
         self._motion = Loading.of(self.space, free, motion)

@@ -16,8 +16,11 @@ from plates import invoke_program
 import skfsink
 from skfsink.cases.symmetric_double_edge_notch import symmetric_double_edge_notch
 from skfsink.density import Density, DensitySolver
+from skfsink.errors import ParameterError
+from skfsink.explicit import Explicit
 from skfsink.gauge import Gauge
 from skfsink.hht import HHT, HHTControls
+from skfsink.homogeneous import peaks
 from skfsink.indicators import greatest_stretch
 from skfsink.loads import Grip, Ramp
 from skfsink.material import AAA, SinkLaw
@@ -247,6 +250,26 @@ def test_a_density_that_has_not_changed_is_kept() -> None:
     assert other.gamma.max() < one.gamma.min()
     np.testing.assert_array_equal(solver.update(np.full_like(space.w, 0.15), Density(np.ones(space.n_nodes))).gamma,
                                   one.gamma)
+
+
+@pytest.mark.parametrize("kind", ["quad", "hex"])
+def test_a_body_held_everywhere_is_loaded(kind: str) -> None:
+    """Fails if a body without unknowns, as one element between two grips, is said to have no equilibrium."""
+    space = box(kind, 1, 0.0)
+    momentum, density = Momentum(space, AAA()), DensitySolver(space, SinkLaw(length_scale=1.0))
+    velocity = np.zeros_like(space.X)
+    velocity[:, 0] = SPEED * space.X[:, 1]  # simple shear
+    free, state = np.zeros(space.X.size, bool), State.intact(space)
+    loads = []
+    for _ in Statics(momentum, density, free, velocity).load(state):
+        loads.append(float(np.vdot(momentum.force(state.u), velocity)) / SPEED)
+    assert max(loads) == pytest.approx(peaks(AAA(), SinkLaw())["simple shear"].stress, rel=2e-3)
+    scheme, start = Explicit(momentum, density, free, velocity), state.time
+    scheme.begin(state)
+    scheme.step(state)
+    assert state.time > start and 0.0 < scheme.dt < np.inf
+    with pytest.raises(ParameterError, match="every node is held"):
+        HHT(momentum, density, free, velocity)
 
 
 # --- whole runs ---
