@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 __all__ = ["CheckpointError", "ConvergenceError", "InstabilityError", "MeshError", "MissingExtra",
-           "OutputError", "ParameterError", "SkfsinkError", "require"]
+           "OutputError", "ParameterError", "SkfsinkError", "place_text", "require"]
 
 
 class SkfsinkError(Exception):
@@ -62,3 +63,8 @@ def require(name: str, value: float, unit: str = "", *, low: float = -math.inf, 
     if not math.isfinite(number) or too_low or too_high or (whole and number % 1):
         raise ParameterError(f"{allowed}; got {value!r}")
     return number
+
+
+def place_text(x: Iterable[float]) -> str:
+    """A place as it stands in a message, to three digits."""
+    return "(" + ", ".join(f"{value:.3g}" for value in x) + ")"

@@ -13,7 +13,7 @@ from collections.abc import Callable
 import numpy as np
 
 from . import indicators
-from .errors import InstabilityError, SkfsinkError
+from .errors import InstabilityError, SkfsinkError, place_text
 from .momentum import Momentum
 from .overlap import overlap
 from .regions import Region, by_element
@@ -104,7 +104,7 @@ class Guard:
         if angle > self.SHARP:
             log.warning("a notch turns by %.0f degrees at one node, at %s mm (above %g): it is as sharp as elements "
                         "are small, which moves onset and U; round it with at least 4 elements", angle,
-                        _place(place), self.SHARP)
+                        place_text(place), self.SHARP)
         c = self.scene.controls
         if c.analysis != "quasistatic" and c.integrator == "explicit":
             self._check_widths()
@@ -116,7 +116,7 @@ class Guard:
         if widths[e] < self.NARROW * typical:
             log.warning("an element near %s mm is %.2g mm narrow, most are %.2g mm (a share less than %g): it makes "
                         "the explicit step that much shorter for all; mend the mesh there, or take --integrator hht",
-                        _place(self.space.X[self.space.conn[e]].mean(axis=0)), widths[e], typical, self.NARROW)
+                        place_text(self.space.X[self.space.conn[e]].mean(axis=0)), widths[e], typical, self.NARROW)
 
     def check_onset(self, state: State) -> None:
         """Look at the state at the onset: where it will crack, and whether it is an equilibrium worth starting from.
@@ -133,7 +133,7 @@ class Guard:
         if h > l / self.COARSE:
             log.warning("where it begins to fail, at %s mm, elements have h = %.3g mm, l/h = %.2f (less than %g): "
                         "onset and U are those of the mesh; refine it there to h <= l/3, or raise --length-scale",
-                        _place(space.X[weakest]), h, l / h, self.COARSE)
+                        place_text(space.X[weakest]), h, l / h, self.COARSE)
         self._check_pressure(state)
         error, allowed = state.ledger.error(state.ledger.elastic), self.scene.controls.balance_tolerance
         if not error <= allowed:
@@ -242,7 +242,7 @@ class Guard:
             e = int(np.flatnonzero(state.deleted)[np.argmax(h)])
             log.warning("the crack runs through elements of h = %.3g mm, l/h = %.2f (less than %g), near %s mm: its "
                         "width and U are those of the mesh there; refine it to h <= l/3", float(h.max()),
-                        l / float(h.max()), self.COARSE, _place(space.X[space.conn[e]].mean(axis=0)))
+                        l / float(h.max()), self.COARSE, place_text(space.X[space.conn[e]].mean(axis=0)))
         if self.momentum.least_J < self.FLAT:
             self._check_shape(state)
 
@@ -274,7 +274,7 @@ class Guard:
         log.warning("faces pass through each other by %.3g mm at %s, near %s mm of the undeformed body (%.2g of the "
                     "element there): there is no contact, and what follows is a body that reaches into itself; end the "
                     "loading before they meet, or give the notch more width", found.depth, self._when(state),
-                    _place(found.place), found.depth / found.size)
+                    place_text(found.place), found.depth / found.size)
 
     def check_stress(self, state: State, crushed: np.ndarray) -> None:
         """Elements, a mask (ne,), whose stress is unknown, see :func:`.cauchy_stress`."""
@@ -283,7 +283,7 @@ class Guard:
             log.warning("the stress of %d element(s) is not known at %s, as of one near %s mm: a point that exerts a "
                         "force is crushed or inside out there; frames have NaN for it, and 1 in the field crushed; "
                         "refine the mesh where it is pressed, or raise --force-floor", crushed.sum(), self._when(state),
-                        _place(self.space.X[first].mean(axis=0)))
+                        place_text(self.space.X[first].mean(axis=0)))
 
     def check_end(self) -> None:
         """Say to what depth faces have passed through each other, if that was more than when it was first seen."""
@@ -299,10 +299,6 @@ class Guard:
         if self.scene.controls.analysis == "quasistatic" and state.phase == "event":
             return f"sweep {state.step}"
         return f"t = {state.time:.4g} s"
-
-
-def _place(x: np.ndarray) -> str:
-    return "(" + ", ".join(f"{value:.3g}" for value in x) + ")"
 
 
 def _nan_first(entry: tuple[float, str]) -> float:

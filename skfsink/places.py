@@ -16,6 +16,7 @@ import numpy as np
 from . import indicators
 from .crack import CrackTracker, Plane
 from .density import DensitySolver
+from .errors import place_text
 from .loads import Grip, Ramp
 from .scene import Scene
 from .state import State
@@ -122,14 +123,10 @@ def _distance(X: np.ndarray, x: np.ndarray) -> float:
 
 def said(onset: dict[str, Any]) -> str:
     """The onset in words."""
-    x, boundary = _place(onset["place_mm"]), onset["boundary"]
+    x, boundary = place_text(onset["place_mm"]), onset["boundary"]
     where = {"everywhere": "everywhere at once, most", "inside": "inside,", "surface": "at its surface,"}.get(
         boundary, f"at {boundary},")
     return f"the body begins to fail {where} at {x} mm"
-
-
-def _place(x: Iterable[float]) -> str:
-    return "(" + ", ".join(f"{value:.3g}" for value in x) + ")"
 
 
 def check_beginning(scene: Scene, state: State) -> None:
@@ -144,12 +141,12 @@ def check_beginning(scene: Scene, state: State) -> None:
     if near:
         log.warning("the body begins to fail at the grip %s, at %s mm (nearer than l = %g mm): onset and crack are "
                     "those of the clamp, not of the body; give it wider ends, or the elements at the grip a stronger "
-                    "region, or let the boundary slide", min(near)[1], _place(x), l)
+                    "region, or let the boundary slide", min(near)[1], place_text(x), l)
         return
     notch = _notch_nodes(scene)
     if notch.size and (distance := _distance(space.X[notch], x)) > AWAY * l and not _on_plane(scene, x):
         log.warning("the body begins to fail at %s mm (%s), %.3g mm away from its notch (more than %g l): check grips "
-                    "and mesh there, and whether the notch is loaded", _place(x), at, distance, AWAY)
+                    "and mesh there, and whether the notch is loaded", place_text(x), at, distance, AWAY)
 
 
 def _notch_nodes(scene: Scene) -> np.ndarray:

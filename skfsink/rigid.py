@@ -13,6 +13,7 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
+from .errors import place_text
 from .loading import Loading
 from .space import Space
 
@@ -147,7 +148,7 @@ def _names(motions: np.ndarray, dim: int, centre: np.ndarray, size: float) -> It
 
 
 def _place(x: np.ndarray) -> str:
-    return "(" + ", ".join(f"{value:.3g}" for value in np.round(x, 9) + 0.0) + ")"
+    return place_text(np.round(x, 9) + 0.0)  # no -0
 
 
 def _named(space: Space, label: np.ndarray, own: np.ndarray, count: int) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from .errors import place_text
 from .places import greatest_ratio
 from .scene import Scene
 from .simulate import Simulation
@@ -20,8 +21,8 @@ def verdict(scene: Scene, simulation: Simulation) -> str:
         ratio, place = greatest_ratio(simulation.density, state)
         least = float(state.gamma.min())
         soft = f"; the body has softened to gamma = {least:.3g}" if least < SOFTENED else ""
-        return (f"nothing failed: the greatest W/Phi was {ratio:.3g}, at {at(place)}, where points fail near 1{soft}; "
-                f"the loading ended because {simulation.unfailed}")
+        return (f"nothing failed: the greatest W/Phi was {ratio:.3g}, at {place_text(place)} mm, where points fail "
+                f"near 1{soft}; the loading ended because {simulation.unfailed}")
     if simulation.dissolved:
         return f"failed everywhere at once, {_when(scene, state.time)}: no place of it was weaker than another"
     cracked = np.isfinite(tracker.cracked_at)
@@ -36,18 +37,13 @@ def verdict(scene: Scene, simulation: Simulation) -> str:
         first = "" if tracker.arrival is None else f", arrived first {_when(scene, tracker.arrival)}"
         return f"cracked and separated{first}; apart {_when(scene, simulation.recorder.separated_at)}"
     last = simulation.recorder.history.rows[-1]
-    tip = at(np.array([last[f"tip_{x}_mm"] for x in "xyz"[:scene.sample.space.dim]]))
+    tip = f"{place_text(last[f'tip_{x}_mm'] for x in 'xyz'[:scene.sample.space.dim])} mm"
     if quasistatic and simulation.statics.arrested:
         return f"arrested at {tip}: {simulation.statics.arrested}"
     if last["tips"]:
         return f"the crack was still running at event_time = {event:g} s: its tip is at {tip}"
     arrived = "" if tracker.arrival is None else f" after it had arrived {_when(scene, tracker.arrival)}"
     return f"arrested at {tip}{arrived}: no tip has moved for 5 l/c_s at the end of the event"
-
-
-def at(place: np.ndarray) -> str:
-    """A place as it stands in a line."""
-    return "(" + ", ".join(f"{x:.3g}" for x in place) + ") mm"
 
 
 def _when(scene: Scene, clock: float) -> str:
