@@ -13,10 +13,11 @@ from typing import TypeVar
 
 from runs import COARSE, Run
 
-from skfsink import reference
 from skfsink.errors import OutputError, SkfsinkError
-from skfsink.output import write_atomic
-from skfsink.run import SCENE, SUMMARY
+from skfsink.results import reference
+from skfsink.run.run import SUMMARY
+from skfsink.scene.stored import SCENE
+from skfsink.system.files import write_atomic
 
 __all__ = ["compute", "finish", "in_parallel"]
 

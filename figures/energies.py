@@ -12,9 +12,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from runs import CASES, key_of
 
-from skfsink import reference
-from skfsink.output import write_atomic
-from skfsink.reference import Reference
+from skfsink.results import reference
+from skfsink.results.reference import Reference
+from skfsink.system.files import write_atomic
 
 ANALYSES = {"dynamic": ("dynamic", RED), "quasistatic": ("quasi-static", BLUE)}
 

@@ -8,7 +8,8 @@ from flat import plate
 from layout import WIDTH, Panel, densities, microseconds, save, script, title
 from matplotlib.figure import Figure
 
-from skfsink import plot, reference
+from skfsink.pictures import plot
+from skfsink.results import reference
 
 CASE = "single_edge_notch"
 KEYS = {"M3-dynamic": "M3", "M4-dynamic": "M4", "M5-dynamic": "M5", "M4-dynamic-1e-15": r"M4, $10^{-15}$ mm/s",

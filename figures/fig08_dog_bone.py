@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from runs import key_of
 from solids import DOG_BONE, density_strip, dog_bone, gauge_box, scale_bar, speed_strip, triad, view
 
-from skfsink import reference
-from skfsink.deformed import fastest
+from skfsink.pictures.body import fastest
+from skfsink.results import reference
 
 
 def draw(path: Path) -> None:

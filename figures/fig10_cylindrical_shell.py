@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 from runs import key_of
 from solids import SHELL, density_strip, scale_bar, shell, speed_strip, triad, view
 
-from skfsink import reference
-from skfsink.deformed import fastest
-from skfsink.render import bounds
+from skfsink.pictures.body import fastest
+from skfsink.pictures.render import bounds
+from skfsink.results import reference
 
 CASE = "cylindrical_shell"
 

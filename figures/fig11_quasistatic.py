@@ -12,9 +12,9 @@ from matplotlib.figure import Figure
 from runs import CASES, key_of
 from solids import DOG_BONE, SHELL, gauge_box, scale_bar, triad, view
 
-from skfsink import reference
-from skfsink.plot import GAMMA_MAP
-from skfsink.render import bounds
+from skfsink.pictures.plot import GAMMA_MAP
+from skfsink.pictures.render import bounds
+from skfsink.results import reference
 
 
 def draw(path: Path) -> None:

@@ -11,8 +11,9 @@ from matplotlib.figure import Figure
 from runs import key_of
 from sketch import dimension, plane_sample
 
-from skfsink import plot, reference
-from skfsink.scene import Scene
+from skfsink.pictures import plot
+from skfsink.results import reference
+from skfsink.scene.scene import Scene
 
 __all__ = ["plate", "plate_figure"]
 

@@ -16,10 +16,11 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
-from skfsink import deformed, plot
 from skfsink.errors import SkfsinkError
-from skfsink.output import write_atomic
-from skfsink.reference import Reference
+from skfsink.pictures import body as deformed
+from skfsink.pictures import plot
+from skfsink.results.reference import Reference
+from skfsink.system.files import write_atomic
 
 __all__ = ["BLUE", "DPI", "RED", "WIDTH", "Panel", "densities", "dissipation", "microseconds", "save", "script",
            "start", "title"]

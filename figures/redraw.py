@@ -16,8 +16,8 @@ from cyclopts import App, Parameter
 from layout import start
 from runs import CASES, FIGURES, RUNS
 
-from skfsink import plot
 from skfsink.errors import ParameterError, SkfsinkError, require
+from skfsink.pictures import plot
 
 HERE = Path(__file__).resolve().parent
 app = App(name="python figures/redraw.py", help=__doc__, help_format="plaintext", version_flags=[])

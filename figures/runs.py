@@ -2,7 +2,7 @@
 
 A run is stored as the reference `cases/<case>/reference/<key>`. It is computed by its command line,
 `python -m skfsink.cases.<case> <arguments> --out results/reference/<case>/<key>`. The phrases in `frames` say which
-frames are kept (see `skfsink.reference.pick_frame`), those in `velocity` for which of them the velocity is kept.
+frames are kept (see `skfsink.results.reference.pick_frame`), those in `velocity` for which of them velocities are.
 The run `coarse` of each case keeps its summary only, as `coarse.json`.
 """
 

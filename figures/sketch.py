@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path
 
-from skfsink.scene import Scene
-from skfsink.space import Space
+from skfsink.fem.space import Space
+from skfsink.scene.scene import Scene
 
 __all__ = ["arrows", "dimension", "loops", "plane_sample"]
 

@@ -12,11 +12,11 @@ from matplotlib.colors import Normalize
 from matplotlib.ticker import MaxNLocator
 from sketch import INK, RED, dimension, plane_sample
 
-from skfsink.deformed import Frame
-from skfsink.plot import GAMMA_MAP, SPEED_MAP
-from skfsink.reference import Reference
-from skfsink.render import Camera, bounds, render
-from skfsink.scene import Scene
+from skfsink.pictures.plot import GAMMA_MAP, SPEED_MAP
+from skfsink.pictures.render import Camera, bounds, render
+from skfsink.results.frame import Frame
+from skfsink.results.reference import Reference
+from skfsink.scene.scene import Scene
 
 __all__ = ["DOG_BONE", "SHELL", "density_strip", "dog_bone", "gauge_box", "scale_bar", "shell",
            "speed_strip", "triad", "view"]

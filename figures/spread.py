@@ -22,9 +22,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from runs import SCANS, Scan
 
-from skfsink import plot, reference
 from skfsink.errors import OutputError, require
-from skfsink.output import write_atomic
+from skfsink.pictures import plot
+from skfsink.results import reference
+from skfsink.system.files import write_atomic
 
 TABLE = "spread.csv"
 RESULTS = [f"{quantity}_{analysis}_{when}" for quantity in "UD" for analysis in ("dynamic", "quasistatic")

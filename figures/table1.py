@@ -9,8 +9,8 @@ import paper
 from layout import BLUE, RED, save, script
 from matplotlib.figure import Figure
 
-from skfsink import reference
-from skfsink.output import write_atomic
+from skfsink.results import reference
+from skfsink.system.files import write_atomic
 
 
 def draw(path: Path) -> None:

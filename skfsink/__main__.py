@@ -6,8 +6,8 @@ import importlib
 
 from cyclopts import App, Group
 
-from . import __version__
-from .cli import run
+from ._version import __version__
+from .cli.program import run
 
 __all__ = ["main"]
 
@@ -22,7 +22,7 @@ def main(arguments: list[str] | None = None) -> None:
               group_commands=Group.create_ordered("Commands"), group_parameters=Group.create_ordered("Parameters"))
     for name, place in COMMANDS.items():
         module, function = place.split(":")
-        app.command(getattr(importlib.import_module(f".commands.{module}", __package__), function), name=name)
+        app.command(getattr(importlib.import_module(f".cli.{module}", __package__), function), name=name)
     run(app, arguments)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
-__all__ = ["CheckpointError", "ConvergenceError", "InstabilityError", "MeshError", "MissingExtra",
+__all__ = ["CheckpointError", "ConvergenceError", "InstabilityError", "Interrupted", "MeshError", "MissingExtra",
            "OutputError", "ParameterError", "SkfsinkError", "place_text", "require"]
 
 
@@ -35,6 +35,10 @@ class CheckpointError(SkfsinkError):
 
 class ConvergenceError(SkfsinkError):
     """An iteration did not converge, and no smaller step is left to try."""
+
+
+class Interrupted(SkfsinkError):
+    """What was running was interrupted and left what it takes to go on."""
 
 
 class InstabilityError(SkfsinkError):

@@ -9,14 +9,14 @@ from typing import NamedTuple
 import numpy as np
 import skfem
 
-from skfsink.density import DensitySolver
-from skfsink.energy import Ledger
+from skfsink.fem.space import Space
+from skfsink.fields.density import DensitySolver
+from skfsink.fields.energy import Ledger
+from skfsink.fields.momentum import Momentum
+from skfsink.fields.state import State
 from skfsink.material import AAA, Material, SinkLaw
-from skfsink.momentum import Momentum
-from skfsink.regions import Region
-from skfsink.space import Space
-from skfsink.state import State
-from skfsink.statics import Statics
+from skfsink.material.regions import Region
+from skfsink.methods.statics import Statics
 
 
 def distorted(mesh: skfem.Mesh, amount: float, seed: int = 0) -> skfem.Mesh:

@@ -9,7 +9,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # threads do not outlive a fork, 
 import pytest
 from bodies import Fracture, at_onset, box, notched
 
-from skfsink.space import Space
+from skfsink.fem.space import Space
 
 
 @pytest.fixture(params=["quad", "hex"])

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from skfsink.sample import Sample
+from skfsink.meshing.sample import Sample
 
 FOLDER = Path(__file__).parent / "data" / "gmsh"
 FORMS = {"41": {"Mesh.MshFileVersion": 4.1}, "41b": {"Mesh.MshFileVersion": 4.1, "Mesh.Binary": 1},

@@ -8,14 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from skfsink.guards import Guard
+from skfsink.fields.momentum import Momentum
+from skfsink.fields.state import State
 from skfsink.material import AAA, SinkLaw
-from skfsink.momentum import Momentum
-from skfsink.progress import Display
-from skfsink.sample import Sample
-from skfsink.scene import Controls, Scene
-from skfsink.simulate import Simulation
-from skfsink.state import State
+from skfsink.meshing.sample import Sample
+from skfsink.run.display import Display
+from skfsink.run.guard import Guard
+from skfsink.run.simulate import Simulation
+from skfsink.scene.controls import Controls
+from skfsink.scene.scene import Scene
 from skfsink.study.blocks import block
 from skfsink.study.body import PULLED, Body
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from skfsink.__main__ import main
 from skfsink.cases.single_edge_notch import single_edge_notch
-from skfsink.cli import command
+from skfsink.cli.program import command
 
 os.environ["SKFSINK_DEBUG"] = "1"  # what should not happen is a traceback then
 SMALL = ["--length-scale", "0.6", "--hht-dt", "5e-7", "--quiet"]  # for the elements of 0.3 mm of `plate()`

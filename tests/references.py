@@ -10,11 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from skfsink import reference
-from skfsink.deformed import Frame
-from skfsink.options import Options
-from skfsink.output import History, Series, write_atomic, write_summary
-from skfsink.scene import Scene
+from skfsink.results import reference
+from skfsink.results.frame import Frame
+from skfsink.results.history import History
+from skfsink.results.series import Series
+from skfsink.results.summary import write_summary
+from skfsink.scene.options import Options
+from skfsink.scene.scene import Scene
+from skfsink.system.files import write_atomic
 
 FIGURES = Path(__file__).resolve().parents[1] / "figures"
 if str(FIGURES) not in sys.path:

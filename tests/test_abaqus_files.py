@@ -10,10 +10,10 @@ import meshio
 import numpy as np
 import pytest
 
-import skfsink.mesh_file as mesh_file
+import skfsink.meshing.mesh_file as mesh_file
 from skfsink.errors import MeshError
-from skfsink.mesh_file import read_mesh_file
-from skfsink.sample import Sample, file_sample
+from skfsink.meshing.mesh_file import read_mesh_file
+from skfsink.meshing.sample import Sample, file_sample
 
 # nine nodes of a plate of 2 x 2 mm, its four quadrilaterals, and two bricks on one another
 NODES = "\n".join(f"{3 * j + i + 1}, {i}., {j}." for j in range(3) for i in range(3)) + "\n"
@@ -161,7 +161,7 @@ def test_elements_of_eight_nodes(kind: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("comma", [",", ""])
 def test_elements_of_other_forms(kind: str, size: int, cell: str, comma: str, tmp_path: Path) -> None:
     """Fails if a form that `skfsink mesh` converts is no cell, or an element over several lines is not one."""
-    from skfsink.mesh_files.abaqus import read_abaqus
+    from skfsink.meshing.files.abaqus import read_abaqus
 
     numbers = [str(i + 1) for i in range(size + 1)]
     lines = f"{comma}\n".join([", ".join(numbers[:16]), ", ".join(numbers[16:])] if size > 15 else [", ".join(numbers)])

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from skfsink import reference
 from skfsink.cases.symmetric_double_edge_notch import symmetric_double_edge_notch
-from skfsink.history import load_name, onset_load
-from skfsink.options import Options
-from skfsink.result import Result
+from skfsink.results import reference
+from skfsink.results.history import load_name, onset_load
+from skfsink.results.result import Result
+from skfsink.scene.options import Options
 
 CASES = ("single_edge_notch", "simple_shear", "symmetric_double_edge_notch", "asymmetric_double_edge_notch", "dog_bone",
          "cylindrical_shell")

@@ -16,17 +16,18 @@ from bodies import grid
 from guarded import PLAIN, scene
 from plates import invoke_program, plate
 
-from skfsink import checks
 from skfsink.errors import ParameterError
-from skfsink.loads import Grip, Ramp, Traction
+from skfsink.fem.space import Space
+from skfsink.loads.grips import Grip, Ramp, Traction
+from skfsink.loads.rigid import free_motions
 from skfsink.material import AAA, SinkLaw
 from skfsink.material.library import material_from
-from skfsink.meshing import write_mesh
-from skfsink.regions import Region
-from skfsink.rigid import free_motions
-from skfsink.sample import Sample
-from skfsink.scene import Controls, Scene
-from skfsink.space import Space
+from skfsink.material.regions import Region
+from skfsink.meshing.sample import Sample
+from skfsink.meshing.vtu import write_mesh
+from skfsink.run import checks
+from skfsink.scene.controls import Controls
+from skfsink.scene.scene import Scene
 
 SIDES = (("left", 0, 0), ("right", 0, 1), ("bottom", 1, 0), ("top", 1, 1), ("back", 2, 0), ("front", 2, 1))
 

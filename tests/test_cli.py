@@ -17,9 +17,9 @@ from plates import SMALL, contents, invoke, plate
 from rich.cells import cell_len
 
 from skfsink import __version__
-from skfsink.meshing import write_mesh
-from skfsink.options import Options
-from skfsink.output import History
+from skfsink.meshing.vtu import write_mesh
+from skfsink.results.history import History
+from skfsink.scene.options import Options
 
 PROGRAM = [sys.executable, "-m", "skfsink.cases.single_edge_notch"]
 POSITIVE = ["side", "notch", "notch-width", "c1", "bulk-modulus", "m", "length-scale", "density", "speed",

@@ -10,12 +10,12 @@ import skfem
 from bodies import boundary, box, grid
 from skfem.helpers import dot
 
-from skfsink.density import DensitySolver
-from skfsink.direct import Factorization
+from skfsink.fem.direct import Factorization
+from skfsink.fem.pattern import Pattern
+from skfsink.fem.space import Space
+from skfsink.fields.density import DensitySolver
+from skfsink.fields.momentum import Momentum
 from skfsink.material import AAA, Material, NeoHookean, SinkLaw
-from skfsink.momentum import Momentum
-from skfsink.pattern import Pattern
-from skfsink.space import Space
 
 SIZES = {"quad": (8, 16, 32), "hex": (4, 8, 12)}
 

@@ -13,18 +13,18 @@ import numpy as np
 import pytest
 from references import scene_of
 
-import skfsink.run
-from skfsink import corridor
+import skfsink.run.run
 from skfsink.cases.single_edge_notch import single_edge_notch
-from skfsink.corridor import Corridor, corridor_report, lay_corridor
 from skfsink.errors import MeshError, OutputError
-from skfsink.meshing import SizeField
-from skfsink.notes import Notes
-from skfsink.options import Options
-from skfsink.progress import Display
-from skfsink.sample import shape_mesh
-from skfsink.shapes import _even
-from skfsink.state import State
+from skfsink.fields.state import State
+from skfsink.meshing.outline import SizeField
+from skfsink.meshing.sample import shape_mesh
+from skfsink.meshing.shapes import _even
+from skfsink.run import two_pass as corridor
+from skfsink.run.display import Display
+from skfsink.run.notes import Notes
+from skfsink.run.two_pass import Corridor, corridor_report, lay_corridor
+from skfsink.scene.options import Options
 
 L = 0.1
 
@@ -94,8 +94,8 @@ def test_a_crack_that_leaves_the_corridor_is_counted_and_warned_of(tmp_path: Pat
 
 def test_without_gmsh_the_committed_mesh_is_taken_and_said_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if the fall-back is silent, or is stored as what it is not."""
-    monkeypatch.setattr(skfsink.run, "has_gmsh", lambda: False)
-    monkeypatch.setattr(skfsink.run, "draw_run", lambda *_: None)
+    monkeypatch.setattr(skfsink.run.run, "has_gmsh", lambda: False)
+    monkeypatch.setattr(skfsink.run.run, "draw_run", lambda *_: None)
     options = Options(mesh_layout="two-pass", event_time=1e-7, out=tmp_path / "run", quiet=True)
     result = single_edge_notch(mesh="coarse", options=options)
     assert any("no gmsh" in text for text in result.summary["warnings"])
@@ -124,7 +124,7 @@ def test_the_mesh_of_two_passes_comes_from_the_folder(tmp_path: Path, monkeypatc
     own = {k: v for k, v in scene.parameters.items() if k in ("side", "notch", "notch_width", "mesh", "mesh_seed")}
     made = _scene(own, options)
     (tmp_path / "scene.toml").write_text(made.toml())
-    again = skfsink.run.read_scene(tmp_path)
+    again = skfsink.scene.stored.read_scene(tmp_path)
     assert again.fingerprint == made.fingerprint and made.sample.space.n_elements < 0.8 * 2993
     with pytest.raises(MeshError, match="no mesh of a corridor"):
         _scene(own, replace(options, corridor=tmp_path / "gone.vtu"))

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from bodies import grid
 
-from skfsink.crack import ADVANCES, CrackTracker, Plane
-from skfsink.space import Space
+from skfsink.fem.space import Space
+from skfsink.fields.crack import ADVANCES, CrackTracker, Plane
 
 L, CS = 0.1, 30.0  # length scale [mm], shear wave speed [m/s]
 H = 0.05           # element size [mm]

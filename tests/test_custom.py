@@ -13,13 +13,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from plates import contents, invoke_program, plate
 
-import skfsink.run
+import skfsink.run.run
 from skfsink.cases.custom import _scene, custom
-from skfsink.deck import read_deck
 from skfsink.errors import MeshError, ParameterError, SkfsinkError
-from skfsink.loader import load
-from skfsink.loading import Loading
-from skfsink.loads import Grip, Ramp, Traction
+from skfsink.loads.grips import Grip, Ramp, Traction
+from skfsink.loads.schedule import Loading
 from skfsink.material import (
     LIMITERS,
     MATERIALS,
@@ -29,10 +27,13 @@ from skfsink.material import (
     own_constants,
     read_constants,
 )
-from skfsink.meshing import write_mesh
-from skfsink.options import Options
-from skfsink.sample import file_sample
-from skfsink.tables import RegionLaw, grip_from, joined, read_tables, region_from, split
+from skfsink.material.regions import RegionLaw
+from skfsink.meshing.sample import file_sample
+from skfsink.meshing.vtu import write_mesh
+from skfsink.results.loader import load
+from skfsink.scene.deck import read_deck
+from skfsink.scene.options import Options
+from skfsink.scene.tables import grip_from, joined, read_tables, region_from, split
 
 HEAD = 'case = "custom"\n[parameters]\nmesh = "plate.vtu"\nlength_scale = 0.6\nevent_time = "5 µs"\n'
 GRIPS = '[[grips]]\nboundary = "top"\nx = 0\ny = "1 µm/s"\n[[grips]]\nboundary = "bottom"\nx = 0\ny = -1e-3\n'
@@ -42,7 +43,7 @@ GRIPS = '[[grips]]\nboundary = "top"\nx = 0\ny = "1 µm/s"\n[[grips]]\nboundary 
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder with the mesh of the small plate, from which runs draw nothing."""
     write_mesh(tmp_path / "plate.vtu", plate())
-    monkeypatch.setattr(skfsink.run, "draw_run", lambda *_: None)
+    monkeypatch.setattr(skfsink.run.run, "draw_run", lambda *_: None)
     monkeypatch.chdir(tmp_path)
     return tmp_path
 

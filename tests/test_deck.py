@@ -12,12 +12,13 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from plates import invoke, invoke_program, plate
 
-from skfsink.commands.show import deck_text
-from skfsink.deck import CASES, parameters_of, read_deck, stored_case
+from skfsink.cli.show import deck_text
 from skfsink.errors import OutputError, ParameterError, SkfsinkError
-from skfsink.loader import load
-from skfsink.meshing import write_mesh
-from skfsink.scene import read_parameters
+from skfsink.meshing.vtu import write_mesh
+from skfsink.results.loader import load
+from skfsink.scene.deck import read_deck
+from skfsink.scene.registry import CASES, parameters_of
+from skfsink.scene.stored import read_parameters, stored_case
 from skfsink.units import UNITS, in_unit
 
 REFERENCES = sorted((Path(__file__).resolve().parents[1] / "cases").glob("*/reference/*/scene.toml"))

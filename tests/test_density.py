@@ -13,13 +13,13 @@ import skfem
 from bodies import box, distorted, grid
 from scipy.sparse import csc_array, diags_array
 
-from skfsink.deletion import delete_failed
-from skfsink.density import Density, DensitySolver
 from skfsink.errors import ConvergenceError, ParameterError
+from skfsink.fem.space import Space
+from skfsink.fields.deletion import delete_failed
+from skfsink.fields.density import Density, DensitySolver
+from skfsink.fields.state import State
 from skfsink.material import SinkLaw
-from skfsink.meshing import read_mesh
-from skfsink.space import Space
-from skfsink.state import State
+from skfsink.meshing.vtu import read_mesh
 
 COMMITTED = Path(__file__).resolve().parents[1] / "cases" / "single_edge_notch" / "meshes"
 LAW = SinkLaw()

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from bodies import boundary, box, patchy, wavy
 
-from skfsink.direct import Factorization
 from skfsink.errors import ConvergenceError
+from skfsink.fem.direct import Factorization
+from skfsink.fem.pattern import Pattern
+from skfsink.fem.space import Space
+from skfsink.fields.momentum import Momentum
 from skfsink.material import AAA
-from skfsink.momentum import Momentum
-from skfsink.pattern import Pattern
-from skfsink.space import Space
 
 BACKENDS = pytest.mark.parametrize("backend", ["pardiso", "superlu"])
 

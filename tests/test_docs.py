@@ -15,13 +15,14 @@ import pytest
 from plates import invoke_program, plate
 
 import skfsink
-from skfsink import sample
 from skfsink.cases.single_edge_notch import single_edge_notch
-from skfsink.cli import command
-from skfsink.deck import CASES, case_function, parameters_of
-from skfsink.meshing import write_mesh
-from skfsink.options import Options
-from skfsink.statics import Statics, StaticsControls
+from skfsink.cli.program import command
+from skfsink.meshing import sample
+from skfsink.meshing.vtu import write_mesh
+from skfsink.methods.controls import StaticsControls
+from skfsink.methods.statics import Statics
+from skfsink.scene.options import Options
+from skfsink.scene.registry import CASES, case_function, parameters_of
 from skfsink.sweep.vary import read_variation
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -14,14 +14,14 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
 from skfsink.errors import SkfsinkError
-from skfsink.explicit import ExplicitControls
-from skfsink.hht import HHTControls
+from skfsink.fields.momentum import Momentum
+from skfsink.fields.state import State
 from skfsink.material import AAA, SinkLaw
-from skfsink.momentum import Momentum
-from skfsink.scene import Controls, Scene
-from skfsink.simulate import Simulation
-from skfsink.state import State
-from skfsink.statics import Statics
+from skfsink.methods.controls import ExplicitControls, HHTControls
+from skfsink.methods.statics import Statics
+from skfsink.run.simulate import Simulation
+from skfsink.scene.controls import Controls
+from skfsink.scene.scene import Scene
 from skfsink.study.blocks import block
 from skfsink.study.body import Body
 

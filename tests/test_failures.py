@@ -9,14 +9,12 @@ import numpy as np
 import pytest
 import skfem
 
-from skfsink.cli import command
+from skfsink.cli.program import command
 from skfsink.errors import ParameterError
-from skfsink.explicit import ExplicitControls
-from skfsink.hht import HHTControls
-from skfsink.indicators import alternation, inverted, turning
-from skfsink.scene import Controls
-from skfsink.space import Space
-from skfsink.statics import StaticsControls
+from skfsink.fem.indicators import alternation, inverted, turning
+from skfsink.fem.space import Space
+from skfsink.methods.controls import ExplicitControls, HHTControls, StaticsControls
+from skfsink.scene.controls import Controls
 from skfsink.study import stability_elements, stability_onset, stability_time
 from skfsink.study.blocks import block
 from skfsink.study.stability import stability

@@ -18,8 +18,9 @@ from PIL import Image
 from references import FIGURES, fill, scene_of
 
 import skfsink
-from skfsink import plot, reference
 from skfsink.errors import OutputError, ParameterError
+from skfsink.pictures import plot
+from skfsink.results import reference
 
 for name in ("compute", "layout", "redraw", "runs", "sketch", "spread"):
     importlib.import_module(name)

@@ -10,13 +10,13 @@ from PIL import Image
 from references import STEP, TIPS, scene_of, write_run
 
 import skfsink
-from skfsink.cli import command
-from skfsink.commands.render import render
-from skfsink.deformed import body
+from skfsink.cli.program import command
+from skfsink.cli.render import render
 from skfsink.errors import OutputError, ParameterError
-from skfsink.film import camera_of, film, still
-from skfsink.pictures import read_frame
-from skfsink.render import bounds
+from skfsink.pictures.body import body
+from skfsink.pictures.film import camera_of, film, still
+from skfsink.pictures.render import bounds
+from skfsink.results.frame import read_frame
 
 pytest.importorskip("pyvista", reason="pyvista, the extra view, is not installed")
 

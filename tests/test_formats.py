@@ -16,10 +16,10 @@ from scipy.io import netcdf_file
 from test_mesh_files import mutated, outcome
 
 from skfsink.errors import MeshError
-from skfsink.mesh_file import read_mesh_file
-from skfsink.mesh_files.lz4 import lz4_block
-from skfsink.output import Series
-from skfsink.sample import Sample, file_sample
+from skfsink.meshing.files.lz4 import lz4_block
+from skfsink.meshing.mesh_file import read_mesh_file
+from skfsink.meshing.sample import Sample, file_sample
+from skfsink.results.series import Series
 
 STORED = sorted(vtk_kinds.FOLDER.glob("*.vt*"))
 SIDES = {"left", "right", "bottom", "top", "back", "front"}

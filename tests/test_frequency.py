@@ -7,11 +7,11 @@ import pytest
 import scipy.linalg as la
 from bodies import boundary, box
 
-from skfsink import frequency
 from skfsink.errors import ConvergenceError, InstabilityError
+from skfsink.fem.pattern import Pattern
+from skfsink.fields.momentum import Momentum
 from skfsink.material import AAA
-from skfsink.momentum import Momentum
-from skfsink.pattern import Pattern
+from skfsink.methods import frequency
 
 
 def estimate(tolerance: float) -> tuple[float, float, float]:

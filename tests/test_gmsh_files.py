@@ -12,9 +12,9 @@ from gmsh_kinds import FOLDER, FORMS, KINDS, check, make, model, points_of, sets
 from plates import SMALL, invoke, plate
 from test_mesh_files import gmsh_4, outcome, write
 
-from skfsink.mesh_file import read_mesh_file
-from skfsink.meshing import write_mesh
-from skfsink.sample import Sample, file_sample
+from skfsink.meshing.mesh_file import read_mesh_file
+from skfsink.meshing.sample import Sample, file_sample
+from skfsink.meshing.vtu import write_mesh
 
 STORED = sorted(FOLDER.glob("*.msh"))
 NAMES = [path.stem for path in STORED]

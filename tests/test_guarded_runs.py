@@ -10,17 +10,17 @@ import numpy as np
 import pytest
 from guarded import NOTCHED, PLAIN, SHARP, event
 
-from skfsink.density import DensitySolver
-from skfsink.energy import Ledger
 from skfsink.errors import ConvergenceError, InstabilityError, ParameterError
-from skfsink.explicit import Explicit, ExplicitControls
-from skfsink.hht import HHTControls
+from skfsink.fields.density import DensitySolver
+from skfsink.fields.energy import Ledger
+from skfsink.fields.state import State
 from skfsink.material import SinkLaw
-from skfsink.progress import Display
-from skfsink.result import summarize
-from skfsink.simulate import Simulation, onset_copy
-from skfsink.state import State
-from skfsink.statics import Statics, StaticsControls
+from skfsink.methods.controls import ExplicitControls, HHTControls, StaticsControls
+from skfsink.methods.explicit import Explicit
+from skfsink.methods.statics import Statics
+from skfsink.run.display import Display
+from skfsink.run.simulate import Simulation, onset_copy
+from skfsink.run.summarize import summarize
 from skfsink.study.body import Body
 
 

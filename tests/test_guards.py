@@ -12,15 +12,14 @@ import pytest
 import skfem
 from guarded import NOTCHED, SHARP, Watched, scene
 
-from skfsink.energy import Ledger
 from skfsink.errors import InstabilityError
-from skfsink.explicit import ExplicitControls
-from skfsink.hht import HHTControls
+from skfsink.fem.space import Space
+from skfsink.fields.energy import Ledger
 from skfsink.material import AAA
-from skfsink.notes import Notes
-from skfsink.sample import Sample
-from skfsink.scene import Scene
-from skfsink.space import Space
+from skfsink.meshing.sample import Sample
+from skfsink.methods.controls import ExplicitControls, HHTControls
+from skfsink.run.notes import Notes
+from skfsink.scene.scene import Scene
 from skfsink.study.blocks import block
 
 MU = AAA().shear_modulus

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 from bodies import Fracture, box, ends
 
-from skfsink.density import DensitySolver
-from skfsink.explicit import Explicit, ExplicitControls
-from skfsink.hht import HHT, HHTControls
+from skfsink.fields.density import DensitySolver
+from skfsink.fields.momentum import Momentum
+from skfsink.fields.state import State
 from skfsink.material import AAA, SinkLaw
-from skfsink.momentum import Momentum
-from skfsink.state import State
+from skfsink.methods.controls import ExplicitControls, HHTControls
+from skfsink.methods.explicit import Explicit
+from skfsink.methods.hht import HHT
 
 EXACT = {"force_tolerance": 1e-9, "correction_tolerance": 1e-9, "max_iterations": 30}
 

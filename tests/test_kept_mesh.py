@@ -12,15 +12,15 @@ import pytest
 from bodies import box
 from plates import SMALL, contents, figures, forked, invoke, invoke_program, plate
 
-import skfsink.run
-from skfsink import sample as samples
+import skfsink.run.run
 from skfsink.cases.single_edge_notch import single_edge_notch
-from skfsink.kept_mesh import keep_mesh, mesh_name, origin
-from skfsink.loader import load
-from skfsink.meshing import write_mesh
-from skfsink.options import Options
+from skfsink.meshing import sample as samples
+from skfsink.meshing.kept_mesh import keep_mesh, mesh_name, origin
+from skfsink.meshing.sample import Sample, file_sample, kept_sample
+from skfsink.meshing.vtu import write_mesh
 from skfsink.report import write_report
-from skfsink.sample import Sample, file_sample, kept_sample
+from skfsink.results.loader import load
+from skfsink.scene.options import Options
 
 QUICK = [*SMALL, "--event-time", "2e-6"]
 NAMES = ("left", "gmsh", "region:1", "a/b", 'with "quotes", commas and <tags>', "Größe µ", "x" * 300, "new\tline\n", "")
@@ -29,8 +29,8 @@ NAMES = ("left", "gmsh", "region:1", "a/b", 'with "quotes", commas and <tags>', 
 @pytest.fixture
 def plain(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave out the pictures."""
-    monkeypatch.setattr(skfsink.run, "draw_run", lambda *_: None)
-    monkeypatch.setattr(skfsink.run, "draw_comparison", lambda *_: None)
+    monkeypatch.setattr(skfsink.run.run, "draw_run", lambda *_: None)
+    monkeypatch.setattr(skfsink.run.run, "draw_comparison", lambda *_: None)
 
 
 @pytest.mark.parametrize("kind", ["quad", "hex"])
@@ -116,7 +116,7 @@ def test_a_mesh_that_gmsh_made_is_kept(tmp_path: Path, plain: None, monkeypatch:
     """Fails if a folder needs gmsh, or the same version of it, to be resumed or shown elsewhere."""
     made = samples._from_meshio("coarse", plate(), made=True)
     with monkeypatch.context() as patch:
-        patch.setattr("skfsink.layout.shape_sample", lambda *_: made)
+        patch.setattr("skfsink.scene.arrange.shape_sample", lambda *_: made)
         result = single_edge_notch(mesh="coarse", side=4.0, notch=1.0, options=Options(
             length_scale=0.6, event_time=2e-6, out=tmp_path / "run", quiet=True))
     stored = tomllib.loads((tmp_path / "run" / "scene.toml").read_text())

@@ -9,14 +9,14 @@ import skfem
 from bodies import boundary, box, distorted, ends, grid, patchy, wavy
 from scipy.spatial.transform import Rotation
 
-from skfsink import kernels
-from skfsink.density import DensitySolver
 from skfsink.errors import MeshError, ParameterError
-from skfsink.forms import density_forms, momentum_forms
+from skfsink.fem import kernels
+from skfsink.fem.forms import density_forms, momentum_forms
+from skfsink.fem.pattern import Pattern
+from skfsink.fem.space import Space
+from skfsink.fields.density import DensitySolver
+from skfsink.fields.momentum import Momentum
 from skfsink.material import AAA, NeoHookean, SinkLaw
-from skfsink.momentum import Momentum
-from skfsink.pattern import Pattern
-from skfsink.space import Space
 
 ROUNDING = 1e-12
 both_elements = pytest.mark.parametrize("element", ["jbar", "plain"])

@@ -15,27 +15,29 @@ import pytest
 from plates import invoke, plate
 from references import scene_of
 
-import skfsink.run
-from skfsink import models
+import skfsink.run.run
 from skfsink.cases.single_edge_notch import _scene, single_edge_notch
-from skfsink.crack import CRACKED
-from skfsink.density import DensitySolver
-from skfsink.errors import MeshError, OutputError, ParameterError
-from skfsink.halving import Mirror, Whole, cut
-from skfsink.hht import HHTControls
+from skfsink.errors import Interrupted, MeshError, OutputError, ParameterError
+from skfsink.fields.crack import CRACKED
+from skfsink.fields.density import DensitySolver
+from skfsink.fields.momentum import Momentum
+from skfsink.loads.grips import Grip
 from skfsink.material import AAA
-from skfsink.meshing import write_mesh
-from skfsink.models import LADDERS, REFERENCE, Ladder, choose_model, rung
-from skfsink.momentum import Momentum
-from skfsink.options import QUANTITIES, Options
-from skfsink.progress import Display
-from skfsink.quantities import relative_error
-from skfsink.rest import LoadingFromRest
-from skfsink.run import read_scene
-from skfsink.sample import _from_meshio, data_folder
-from skfsink.scene import Grip, Scene
-from skfsink.simulate import Interrupted, Simulation
-from skfsink.sweeping import swept
+from skfsink.meshing.sample import _from_meshio
+from skfsink.meshing.sweeping import swept
+from skfsink.meshing.symmetry import Mirror, Whole, cut
+from skfsink.meshing.vtu import write_mesh
+from skfsink.methods.controls import HHTControls
+from skfsink.methods.rest import LoadingFromRest
+from skfsink.run import model as models
+from skfsink.run.display import Display
+from skfsink.run.model import LADDERS, REFERENCE, Ladder, choose_model, rung
+from skfsink.run.quantities import relative_error
+from skfsink.run.simulate import Simulation
+from skfsink.scene.options import QUANTITIES, Options
+from skfsink.scene.scene import Scene
+from skfsink.scene.stored import read_scene
+from skfsink.system.shipped import data_folder
 
 HALVES = ("single_edge_notch", "symmetric_double_edge_notch", "dog_bone", "cylindrical_shell")
 OWN = {name: p.default for name, p in inspect.signature(single_edge_notch).parameters.items() if name != "options"}
@@ -75,7 +77,7 @@ def test_a_half_has_the_onset_of_the_whole(tmp_path: Path) -> None:
         scene = with_options("single_edge_notch", "coarse-mirror", half=half, event_time=1e-9)
         simulation = Simulation(scene, tmp_path, Display(quiet=True))
         simulation.run()
-        found[half] = skfsink.result.measured(scene, simulation.recorder), \
+        found[half] = skfsink.results.result.measured(scene, simulation.recorder), \
             simulation.state.ledger.initial * scene.whole.energy
     for name in ("onset_load", "onset_displacement"):
         assert found[True][0][name] == pytest.approx(found[False][0][name], rel=1e-3)
@@ -324,7 +326,7 @@ def test_errors_of_paths() -> None:
 
 def test_the_choice_is_printed_and_stored(ladder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if a run does not say which model it took, forgets it in a file, or takes another one when resumed."""
-    monkeypatch.setattr(skfsink.run, "draw_run", lambda *_: None)
+    monkeypatch.setattr(skfsink.run.run, "draw_run", lambda *_: None)
     monkeypatch.chdir(tmp_path)
     flags = ["--mesh", "coarse", "--model", "onset"]
     status, err, _ = invoke(*flags)

@@ -11,23 +11,25 @@ import pytest
 from bodies import box, ends, notched, wavy
 from guarded import NOTCHED, PLAIN, simulation
 
-from skfsink.density import DensitySolver
-from skfsink.energy import Ledger
-from skfsink.errors import ConvergenceError, MeshError, ParameterError
-from skfsink.explicit import Explicit, ExplicitControls
-from skfsink.hht import HHT, HHTControls
-from skfsink.history import History
-from skfsink.loading import Loading
-from skfsink.loads import Grip, Ramp, Traction
+from skfsink.errors import ConvergenceError, Interrupted, MeshError, ParameterError
+from skfsink.fem.space import Space
+from skfsink.fields.density import DensitySolver
+from skfsink.fields.energy import Ledger
+from skfsink.fields.momentum import Momentum
+from skfsink.fields.state import State
+from skfsink.loads.grips import Grip, Ramp, Traction
+from skfsink.loads.schedule import Loading
 from skfsink.material import AAA, SinkLaw
-from skfsink.momentum import Momentum
-from skfsink.progress import Display
-from skfsink.scene import Controls, Scene
-from skfsink.simulate import Interrupted, Simulation
-from skfsink.space import Space
-from skfsink.state import State
-from skfsink.statics import Statics, StaticsControls
-from skfsink.verdict import verdict
+from skfsink.methods.controls import ExplicitControls, HHTControls, StaticsControls
+from skfsink.methods.explicit import Explicit
+from skfsink.methods.hht import HHT
+from skfsink.methods.statics import Statics
+from skfsink.results.history import History
+from skfsink.run.display import Display
+from skfsink.run.simulate import Simulation
+from skfsink.run.verdict import verdict
+from skfsink.scene.controls import Controls
+from skfsink.scene.scene import Scene
 
 TOUGH = SinkLaw(phi=1e3)  # never reached: gamma stays 1
 FINE = {"force_tolerance": 1e-8, "correction_tolerance": 1e-8, "gamma_tolerance": 1e-7, "max_iterations": 40}

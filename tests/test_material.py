@@ -14,12 +14,12 @@ from scipy.optimize import minimize_scalar
 from scipy.spatial.transform import Rotation
 
 from skfsink.errors import ParameterError
-from skfsink.forms import momentum_forms
-from skfsink.hht import HHTControls
-from skfsink.kernels import Law, Tiles, tangent
+from skfsink.fem.forms import momentum_forms
+from skfsink.fem.kernels import Law, Tiles, tangent
+from skfsink.fem.pattern import Pattern
+from skfsink.fem.space import Space
 from skfsink.material import AAA, Material, NeoHookean, SinkLaw
-from skfsink.pattern import Pattern
-from skfsink.space import Space
+from skfsink.methods.controls import HHTControls
 
 MATERIALS = [AAA(), NeoHookean()]
 every_material = pytest.mark.parametrize("material", MATERIALS, ids=["AAA", "NeoHookean"])

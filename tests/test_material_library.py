@@ -8,12 +8,13 @@ from bodies import boundary, box, close, ends, momentum_of, patchy, wavy
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
-from skfsink import stress
 from skfsink.errors import ParameterError
-from skfsink.forms import momentum_forms
-from skfsink.homogeneous import PATHS, curve, extent, peaks
-from skfsink.homogeneous_chart import stress_picture
-from skfsink.kernels import Tiles
+from skfsink.fem.forms import momentum_forms
+from skfsink.fem.kernels import Tiles
+from skfsink.fem.pattern import Pattern
+from skfsink.fem.space import Space
+from skfsink.fields import stress
+from skfsink.fields.momentum import Momentum
 from skfsink.material import (
     AAA,
     LIMITERS,
@@ -29,9 +30,8 @@ from skfsink.material import (
     Yeoh,
     material_from,
 )
-from skfsink.momentum import Momentum
-from skfsink.pattern import Pattern
-from skfsink.space import Space
+from skfsink.material.homogeneous import PATHS, curve, extent, peaks
+from skfsink.pictures.stress_curves import stress_picture
 
 TISSUE = {"k2": 2.0, "angle": 30.0, "axis": (1.0, 0.5, 0.3), "normal": (0.1, 0.2, 1.0)}  # pulled and slack fibres
 MOONEY = MooneyRivlin(c1=0.4, c2=0.3, bulk_modulus=50.0)
@@ -456,7 +456,7 @@ def test_sides_of_a_pulled_tissue_are_free_and_unequal():
 
 def test_command_prints_the_strengths_and_draws(tmp_path, capsys: pytest.CaptureFixture):
     """Fails if `material` does not print the table, ignores a constant, or writes no picture."""
-    from skfsink.commands.material import material
+    from skfsink.cli.material import material
 
     material("aaa", out=tmp_path / "aaa.png")
     printed = capsys.readouterr().out

@@ -13,12 +13,13 @@ import pytest
 from plates import contents, invoke_program, plate
 
 from skfsink.errors import MeshError, ParameterError
-from skfsink.mesh_files.convert import converted
-from skfsink.mesh_files.quality import Quality
-from skfsink.mesh_files.split import split
-from skfsink.mesh_files.tidy import drop_empty, notes_of
-from skfsink.meshing import read_mesh, scaled_jacobian, write_mesh
-from skfsink.sample import Sample, file_sample, mesh_sample
+from skfsink.meshing.files.convert import converted
+from skfsink.meshing.files.quality import Quality
+from skfsink.meshing.files.split import split
+from skfsink.meshing.files.tidy import drop_empty, notes_of
+from skfsink.meshing.outline import scaled_jacobian
+from skfsink.meshing.sample import Sample, file_sample, mesh_sample
+from skfsink.meshing.vtu import read_mesh, write_mesh
 
 CUBE = np.array([[i, j, k] for k in (0, 1) for j in (0, 1) for i in (0, 1)])
 
@@ -357,7 +358,7 @@ def test_a_run_names_the_command(tmp_path: Path) -> None:
 def test_a_run_on_a_converted_mesh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if a converted mesh cannot be run, or its boundaries are not those of the file."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("skfsink.run.draw_run", lambda *_: None)
+    monkeypatch.setattr("skfsink.run.run.draw_run", lambda *_: None)
     write_mesh(tmp_path / "plate.vtu", triangles(mixed=True))
     status, err, out = invoke_program("mesh", "plate.vtu", "ready.vtu", "--length-scale", "0.4")
     assert (status, err) == (0, "") and "128 quadrilaterals" in out and "upper" in out and "notch" in out

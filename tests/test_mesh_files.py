@@ -21,9 +21,9 @@ from hypothesis import strategies as st
 from plates import plate
 
 from skfsink.errors import MeshError, SkfsinkError
-from skfsink.mesh_file import check_mesh, read_mesh_file
-from skfsink.meshing import write_mesh
-from skfsink.sample import Sample, file_sample, load_sample
+from skfsink.meshing.mesh_file import check_mesh, read_mesh_file
+from skfsink.meshing.sample import Sample, file_sample, load_sample
+from skfsink.meshing.vtu import write_mesh
 
 FORMATS = ("vtu", "vtu-text", "msh2", "msh2-binary", "msh4", "msh4-binary", "inp")
 SECONDS = 10.0  # that a file may take

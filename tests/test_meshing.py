@@ -12,8 +12,9 @@ import meshio
 import numpy as np
 import pytest
 
-from skfsink import meshing, shapes
 from skfsink.errors import MissingExtra, ParameterError
+from skfsink.meshing import outline as meshing
+from skfsink.meshing import shapes
 
 FOLDER = Path(__file__).resolve().parents[1] / "cases" / "single_edge_notch" / "meshes"
 SIDE, NOTCH, RADIUS = 4.0, 1.0, 0.05

@@ -15,26 +15,28 @@ from plates import invoke_program
 
 import skfsink
 from skfsink.cases.symmetric_double_edge_notch import symmetric_double_edge_notch
-from skfsink.density import Density, DensitySolver
 from skfsink.errors import ParameterError
-from skfsink.explicit import Explicit
-from skfsink.gauge import Gauge
-from skfsink.hht import HHT, HHTControls
-from skfsink.homogeneous import peaks
-from skfsink.indicators import greatest_stretch
-from skfsink.loads import Grip, Ramp
+from skfsink.fem.indicators import greatest_stretch
+from skfsink.fem.space import Space
+from skfsink.fields.density import Density, DensitySolver
+from skfsink.fields.momentum import Momentum
+from skfsink.fields.state import State
+from skfsink.loads.grips import Grip, Ramp
 from skfsink.material import AAA, SinkLaw
+from skfsink.material.homogeneous import peaks
 from skfsink.material.library import MATERIALS
-from skfsink.material_point import beside_theory, mean_deformation, mean_stress
-from skfsink.meshing import write_mesh
-from skfsink.momentum import Momentum
-from skfsink.options import Options
-from skfsink.regions import Region
-from skfsink.sample import Sample
-from skfsink.scene import Controls, Scene
-from skfsink.space import Space
-from skfsink.state import State
-from skfsink.statics import Statics, StaticsControls
+from skfsink.material.regions import Region
+from skfsink.meshing.sample import Sample
+from skfsink.meshing.vtu import write_mesh
+from skfsink.methods.controls import HHTControls, StaticsControls
+from skfsink.methods.explicit import Explicit
+from skfsink.methods.hht import HHT
+from skfsink.methods.statics import Statics
+from skfsink.run.gauge import Gauge
+from skfsink.run.material_point import beside_theory, mean_deformation, mean_stress
+from skfsink.scene.controls import Controls
+from skfsink.scene.options import Options
+from skfsink.scene.scene import Scene
 
 SPEED = 1e-3
 

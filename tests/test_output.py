@@ -17,18 +17,11 @@ import pytest
 from bodies import grid
 
 from skfsink.errors import OutputError
-from skfsink.history import history_header, load_name, onset_load
-from skfsink.output import (
-    HISTORY_COLUMNS,
-    History,
-    Series,
-    prepare_folder,
-    replaced,
-    versions,
-    write_atomic,
-    write_summary,
-)
-from skfsink.space import Space
+from skfsink.fem.space import Space
+from skfsink.results.history import HISTORY_COLUMNS, History, history_header, load_name, onset_load
+from skfsink.results.series import Series
+from skfsink.results.summary import versions, write_summary
+from skfsink.system.files import prepare_folder, replaced, write_atomic
 
 AWKWARD = [0.1 + 0.2, 1 / 3, -0.0, 5e-324, 1.7976931348623157e308, math.nan, -math.inf, np.float64(np.pi)]
 

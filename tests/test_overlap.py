@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from bodies import grid
 
-from skfsink.overlap import overlap
-from skfsink.space import Space
+from skfsink.fem.space import Space
+from skfsink.run.overlap import overlap
 
 WIDTH = 0.02   # of the slit [mm]
 N = 10         # elements along 1 mm

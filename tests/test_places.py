@@ -16,14 +16,14 @@ from guarded import scene
 from plates import invoke_program
 from skfem.io.meshio import to_meshio
 
-from skfsink import places
-from skfsink.loader import load
-from skfsink.loads import Grip, Ramp
+from skfsink.fem.space import Space
+from skfsink.fields.state import State
+from skfsink.loads.grips import Grip, Ramp
+from skfsink.meshing.sample import Sample
 from skfsink.report.tables import key_table
-from skfsink.sample import Sample
-from skfsink.scene import Scene
-from skfsink.space import Space
-from skfsink.state import State
+from skfsink.results.loader import load
+from skfsink.run import places
+from skfsink.scene.scene import Scene
 from skfsink.sweep.table import read_rows
 
 PLATE = notched(15)  # 1 x 1 mm, a notch of 0.4 mm from the left at mid-height, l = 0.1 mm

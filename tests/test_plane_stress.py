@@ -11,29 +11,30 @@ from plates import plate
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
-from skfsink import kernels, reference
 from skfsink.cases.cylindrical_shell import cylindrical_shell
 from skfsink.cases.dog_bone import _scene as dog_bone_scene
 from skfsink.cases.dog_bone import dog_bone
-from skfsink.density import DensitySolver
-from skfsink.energy import Ledger
 from skfsink.errors import ParameterError
-from skfsink.explicit import Explicit
-from skfsink.forms import plane_stress_forms
-from skfsink.frequency import highest_frequency
-from skfsink.kernels import plane_stress
+from skfsink.fem import kernels
+from skfsink.fem.forms import plane_stress_forms
+from skfsink.fem.kernels import plane_stress
+from skfsink.fem.pattern import Pattern
+from skfsink.fem.space import Space
+from skfsink.fields.density import DensitySolver
+from skfsink.fields.energy import Ledger
+from skfsink.fields.momentum import Momentum
+from skfsink.fields.state import State
 from skfsink.material import AAA, Material, NeoHookean, SinkLaw
-from skfsink.momentum import Momentum
-from skfsink.newton import Newton
-from skfsink.options import Options
-from skfsink.pattern import Pattern
-from skfsink.progress import Display
-from skfsink.sample import _from_meshio
-from skfsink.simulate import Simulation
-from skfsink.space import Space
-from skfsink.state import State
-from skfsink.statics import Statics
-from skfsink.sweeping import swept
+from skfsink.meshing.sample import _from_meshio
+from skfsink.meshing.sweeping import swept
+from skfsink.methods.explicit import Explicit
+from skfsink.methods.frequency import highest_frequency
+from skfsink.methods.newton import Newton
+from skfsink.methods.statics import Statics
+from skfsink.results import reference
+from skfsink.run.display import Display
+from skfsink.run.simulate import Simulation
+from skfsink.scene.options import Options
 
 ROUNDING = 1e-12
 both_materials = pytest.mark.parametrize("material", [AAA(), NeoHookean(bulk_modulus=40.0)], ids=["AAA", "NeoHookean"])

@@ -10,10 +10,12 @@ import pytest
 from bodies import grid, notched
 from PIL import Image
 
-from skfsink import deformed, plot
-from skfsink.output import HISTORY_COLUMNS
-from skfsink.plot import Frame, animation, comparison_picture, density_picture, ledger_picture, tip_picture
-from skfsink.space import Space
+from skfsink.fem.space import Space
+from skfsink.pictures import body as deformed
+from skfsink.pictures import plot
+from skfsink.pictures.plot import animation, comparison_picture, density_picture, ledger_picture, tip_picture
+from skfsink.results.frame import Frame
+from skfsink.results.history import HISTORY_COLUMNS
 
 SIDE, NOTCH = 4.0, 1.0
 DPI = 60

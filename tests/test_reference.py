@@ -10,14 +10,13 @@ import numpy as np
 import pytest
 from references import STEP, cracked, scene_of, write_run
 
-from skfsink import reference
-from skfsink.deformed import SPENT
 from skfsink.errors import OutputError
-from skfsink.output import History
-from skfsink.packing import DISPLACEMENT_STEP, GAMMA_STEP, VELOCITY_STEPS, Packer
-from skfsink.pictures import read_frame
-from skfsink.run import read_scene
-from skfsink.sample import data_folder
+from skfsink.results import reference
+from skfsink.results.frame import SPENT, read_frame
+from skfsink.results.history import History
+from skfsink.results.packing import DISPLACEMENT_STEP, GAMMA_STEP, VELOCITY_STEPS, Packer
+from skfsink.scene.stored import read_scene
+from skfsink.system.shipped import data_folder
 
 ROOT = Path(__file__).resolve().parents[1]
 FRAMES = ("growing", "branching", "arrival", "arrival + 5e-6", "end")

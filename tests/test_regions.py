@@ -17,23 +17,24 @@ from guarded import NOTCHED, Watched, scene, simulation
 from scipy.optimize import brentq
 from test_material_library import TISSUE, Hoops
 
-from skfsink import indicators, kernels
-from skfsink.density import DensitySolver
-from skfsink.errors import ParameterError
-from skfsink.explicit import Explicit, ExplicitControls
-from skfsink.forms import density_forms, momentum_forms, plane_stress_forms
-from skfsink.hht import HHT, HHTControls
+from skfsink.errors import Interrupted, ParameterError
+from skfsink.fem import indicators, kernels
+from skfsink.fem.forms import density_forms, momentum_forms, plane_stress_forms
+from skfsink.fem.pattern import Pattern
+from skfsink.fem.space import Space
+from skfsink.fields.density import DensitySolver
+from skfsink.fields.momentum import Momentum
+from skfsink.fields.state import State
+from skfsink.fields.stress import cauchy_stress
 from skfsink.material import AAA, GeneralMaterial, Material, MooneyRivlin, NeoHookean, SinkLaw
-from skfsink.momentum import Momentum
-from skfsink.pattern import Pattern
-from skfsink.progress import Display
-from skfsink.regions import Region
-from skfsink.scene import Scene
-from skfsink.simulate import Interrupted, Simulation
-from skfsink.space import Space
-from skfsink.state import State
-from skfsink.statics import Statics
-from skfsink.stress import cauchy_stress
+from skfsink.material.regions import Region
+from skfsink.methods.controls import ExplicitControls, HHTControls
+from skfsink.methods.explicit import Explicit
+from skfsink.methods.hht import HHT
+from skfsink.methods.statics import Statics
+from skfsink.run.display import Display
+from skfsink.run.simulate import Simulation
+from skfsink.scene.scene import Scene
 
 STIFF, SOFT = NeoHookean(bulk_modulus=800.0, mu=4.0, density=2500.0), NeoHookean(bulk_modulus=40.0, mu=0.5)
 LAW = SinkLaw()

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from bodies import grid
 
-from skfsink import render as module
-from skfsink.deformed import Frame
 from skfsink.errors import MissingExtra
-from skfsink.plot import GAMMA_MAP
-from skfsink.render import SPEED_MAP, Camera, bounds, render, surface
-from skfsink.space import Space
+from skfsink.fem.space import Space
+from skfsink.pictures import render as module
+from skfsink.pictures.plot import GAMMA_MAP
+from skfsink.pictures.render import SPEED_MAP, Camera, bounds, render, surface
+from skfsink.results.frame import Frame
 
 FRONT = Camera((0.0, 0.0, 1.0))
 WIDTH = 240
@@ -71,7 +71,7 @@ def test_without_pyvista_the_extra_is_named(block: Space, monkeypatch: pytest.Mo
 
 
 def test_no_run_imports_pyvista() -> None:
-    code = ("import sys, skfsink.cases.dog_bone, skfsink.reference, skfsink.render; "
+    code = ("import sys, skfsink.cases.dog_bone, skfsink.results.reference, skfsink.pictures.render; "
             "sys.exit(any(name in sys.modules for name in ('pyvista', 'vtk', 'vtkmodules')))")
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 

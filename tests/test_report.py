@@ -20,16 +20,15 @@ import pytest
 from plates import SMALL, invoke, plate
 
 import skfsink
-from skfsink import citation
-from skfsink.cli import command
-from skfsink.commands.report import report
+from skfsink.cli.program import command
+from skfsink.cli.report import report
 from skfsink.errors import OutputError
-from skfsink.history import HISTORY_COLUMNS, History
-from skfsink.loader import ENERGIES, FIELD_UNITS
-from skfsink.meshing import write_mesh
-from skfsink.report import charts, report_page, write_report
+from skfsink.meshing.vtu import write_mesh
+from skfsink.report import charts, citation, report_page, write_report
 from skfsink.report.scenes import command_line, run_labels
-from skfsink.sample import data_folder
+from skfsink.results.history import HISTORY_COLUMNS, History
+from skfsink.results.loader import ENERGIES, FIELD_UNITS
+from skfsink.system.shipped import data_folder
 
 PACKAGE = Path(skfsink.__file__).parent
 BROWSERS = ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome", "chrome")

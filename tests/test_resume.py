@@ -17,12 +17,12 @@ import numpy as np
 import pytest
 from plates import SMALL, contents, figures, forked, invoke, plate
 
-import skfsink.checkpoint
-import skfsink.run
-from skfsink.kept_mesh import keep_mesh
-from skfsink.meshing import write_mesh
-from skfsink.output import History
-from skfsink.sample import load_sample
+import skfsink.run.checkpoint
+import skfsink.run.run
+from skfsink.meshing.kept_mesh import keep_mesh
+from skfsink.meshing.sample import load_sample
+from skfsink.meshing.vtu import write_mesh
+from skfsink.results.history import History
 
 RUNS = {"explicit": [], "short": ["--event-time", "3e-5"], "quasistatic": ["--analysis", "quasistatic"],
         "consistent": ["--sink", "consistent", "--event-time", "4e-5"],
@@ -40,8 +40,8 @@ def mesh(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def plain(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave out the pictures."""
-    monkeypatch.setattr(skfsink.run, "draw_run", lambda *_: None)
-    monkeypatch.setattr(skfsink.run, "draw_comparison", lambda *_: None)
+    monkeypatch.setattr(skfsink.run.run, "draw_run", lambda *_: None)
+    monkeypatch.setattr(skfsink.run.run, "draw_comparison", lambda *_: None)
 
 
 def histories(folder: Path) -> dict[str, bytes]:
@@ -116,10 +116,10 @@ def test_interrupted_while_drawing(number: signal.Signals, mesh: Path, tmp_path:
                                    monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if a signal outside of the stepping is a traceback, or a kill without a word."""
     out = tmp_path / "out"
-    monkeypatch.setattr(skfsink.run, "draw_run", lambda *_: os.kill(os.getpid(), number))
+    monkeypatch.setattr(skfsink.run.run, "draw_run", lambda *_: os.kill(os.getpid(), number))
     arguments = ["--mesh", mesh, "--out", out, "--event-time", "1e-6", *SMALL]
     assert forked(arguments) == (130, f"skfsink: interrupted; go on with skfsink resume {out}\n")
-    monkeypatch.setattr(skfsink.run, "draw_run", lambda *_: None)
+    monkeypatch.setattr(skfsink.run.run, "draw_run", lambda *_: None)
     assert forked(["--resume", out, "--quiet"]) == (0, "") and figures(out)["event"]["duration_s"] >= 1e-6
 
 
@@ -170,7 +170,7 @@ def stopped(mesh: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert forked([*short, "--out", top / "run"], 145)[0] == -9
     assert forked([*short, "--out", top / "other", "--phi", "0.2"], 100)[0] == -9
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(skfsink.run, "draw_run", lambda *_: None)
+        patch.setattr(skfsink.run.run, "draw_run", lambda *_: None)
         assert forked([*short, "--out", top / "both", "--analysis", "both"], 275)[0] == -9
     assert (top / "both" / "quasistatic" / "checkpoint.npz").exists()
     return top
@@ -266,7 +266,7 @@ def test_parameters_beside_resume_must_agree(arguments: list[str], part: str, st
 
 def test_checkpoint_of_another_version(stopped: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if a checkpoint whose meaning may have changed is read."""
-    monkeypatch.setattr(skfsink.checkpoint, "__version__", "0.0.9")
+    monkeypatch.setattr(skfsink.run.checkpoint, "__version__", "0.0.9")
     refused(stopped, "0.0.9", "--resume", stopped / "run")
 
 

@@ -15,19 +15,20 @@ import numpy as np
 import pytest
 from plates import SMALL, invoke, plate
 
-import skfsink.run
+import skfsink.run.run
 from skfsink.cases.single_edge_notch import _scene, single_edge_notch
-from skfsink.checkpoint import load_state, save_state
-from skfsink.digest import digest
 from skfsink.errors import CheckpointError, MeshError, OutputError, ParameterError, require
-from skfsink.halving import Whole
-from skfsink.loads import Ramp
+from skfsink.fields.state import State
+from skfsink.loads.grips import Grip, Ramp
 from skfsink.material import NeoHookean, SinkLaw
-from skfsink.meshing import write_mesh
-from skfsink.options import Options
-from skfsink.regions import Region
-from skfsink.scene import Grip, Scene, read_parameters
-from skfsink.state import State
+from skfsink.material.regions import Region
+from skfsink.meshing.symmetry import Whole
+from skfsink.meshing.vtu import write_mesh
+from skfsink.run.checkpoint import load_state, save_state
+from skfsink.scene.digest import digest
+from skfsink.scene.options import Options
+from skfsink.scene.scene import Scene
+from skfsink.scene.stored import read_parameters
 
 OWN = {name: p.default for name, p in inspect.signature(single_edge_notch).parameters.items() if name != "options"}
 
@@ -49,7 +50,7 @@ def scene(mesh: Path, **options: Any) -> Scene:
 def test_scene_file_is_enough_to_run_again(arguments: list[str], mesh: Path, tmp_path: Path,
                                            monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if a parameter that decides the result is missing from scene.toml, or loses a bit in it."""
-    monkeypatch.setattr(skfsink.run, "draw_run", lambda *_: None)
+    monkeypatch.setattr(skfsink.run.run, "draw_run", lambda *_: None)
     monkeypatch.chdir(tmp_path)  # the mesh is given relative to it
     assert invoke("--mesh", mesh.name, "--out", "first", *SMALL, *arguments)[0] == 0
     parameters = tomllib.loads((tmp_path / "first" / "scene.toml").read_text())["parameters"]
@@ -142,7 +143,7 @@ def test_fingerprint_of_scenes_made_in_python(mesh: Path) -> None:
 
 def test_digests_do_not_depend_on_the_process() -> None:
     """Fails if the hash of a value has an address, the order of a set, or the elided text of an array in it."""
-    code = ("from skfsink.digest import digest; from skfsink.options import Options; o = Options(material='hgo');"
+    code = ("from skfsink import Options; from skfsink.scene.digest import digest; o = Options(material='hgo');"
             "print(digest([o.stored_energy(), o.sink_law(), o.controls(), {'a', 'b', 'c'}]))")
     ran = [subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True,
                           env={**os.environ, "PYTHONHASHSEED": seed}).stdout for seed in "12"]

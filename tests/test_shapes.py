@@ -10,11 +10,13 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from skfsink import shapes
 from skfsink.errors import MeshError, ParameterError
-from skfsink.meshing import completed, read_mesh, scaled_jacobian
-from skfsink.sample import data_folder, load_sample, shape_sample
-from skfsink.sweeping import rolled, swept
+from skfsink.meshing import shapes
+from skfsink.meshing.outline import completed, scaled_jacobian
+from skfsink.meshing.sample import load_sample, shape_sample
+from skfsink.meshing.sweeping import rolled, swept
+from skfsink.meshing.vtu import read_mesh
+from skfsink.system.shipped import data_folder
 
 MESHES = [(case, name) for case, shape in shapes.SHAPES.items() for name in shape.meshes]
 EDGE = {"left", "right", "top", "bottom", "notch"}

@@ -14,17 +14,18 @@ import numpy as np
 import pytest
 from plates import invoke_program, plate
 
-import skfsink.run
-from skfsink import shipped
-from skfsink.deck import CASES, parameters_of, read_deck
+import skfsink.run.run
 from skfsink.errors import ParameterError
 from skfsink.material import SinkLaw
-from skfsink.meshing import write_mesh
-from skfsink.result import Result
-from skfsink.sample import data_folder, file_sample
-from skfsink.shipped import deck_name, deck_path, description, shipped_decks
+from skfsink.meshing.sample import file_sample
+from skfsink.meshing.vtu import write_mesh
+from skfsink.results.result import Result
+from skfsink.scene.deck import read_deck
+from skfsink.scene.registry import CASES, parameters_of
 from skfsink.sweep import plan
 from skfsink.sweep.one import run_folder
+from skfsink.system import shipped
+from skfsink.system.shipped import data_folder, deck_name, deck_path, description, shipped_decks
 
 DECKS = ("biaxial_hole", "centre_crack", "pure_shear")
 
@@ -40,7 +41,7 @@ def beside(name: str, script: str) -> ModuleType:
 
 def loaded(name: str, mesh: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> Result:
     """A deck on one of its meshes at its onset, and some nanoseconds more."""
-    monkeypatch.setattr(skfsink.run, "draw_run", lambda *_: None)
+    monkeypatch.setattr(skfsink.run.run, "draw_run", lambda *_: None)
     text = shipped_decks()[name].read_text()
     text = re.sub(r'(?m)^mesh = "[^"]*"', f'mesh = "{data_folder(name) / "meshes" / mesh}.vtu"', text)
     deck = folder / "deck.toml"
@@ -116,7 +117,7 @@ def test_a_name_stands_for_a_deck(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 def test_commands_take_names(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if `list` leaves a deck out, or `run` and `sweep` do not compute the deck of a name, in its folder."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(skfsink.run, "draw_run", lambda *_: None)
+    monkeypatch.setattr(skfsink.run.run, "draw_run", lambda *_: None)
     status, _, out = invoke_program("list")
     assert status == 0 and all(name in out for name in DECKS)
     for command in (("run", "nothing"), ("sweep", "nothing", "--vary", "m=10")):

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from skfsink.cases.single_edge_notch import single_edge_notch
-from skfsink.options import Options
-from skfsink.result import Result
+from skfsink.results.result import Result
+from skfsink.scene.options import Options
 
 ELEMENT = 0.1 / 1.5  # of the coarse mesh [mm]
 

@@ -8,15 +8,16 @@ import scipy.linalg as la
 from bodies import boundary, box, ends
 from test_density import crack
 
-from skfsink.density import DensitySolver
-from skfsink.explicit import Explicit, ExplicitControls
-from skfsink.frequency import highest_frequency
-from skfsink.hht import HHT, HHTControls
+from skfsink.fem.pattern import Pattern
+from skfsink.fields.density import DensitySolver
+from skfsink.fields.momentum import Momentum
+from skfsink.fields.state import State
 from skfsink.material import AAA, SinkLaw
-from skfsink.momentum import Momentum
-from skfsink.pattern import Pattern
-from skfsink.state import State
-from skfsink.statics import Statics
+from skfsink.methods.controls import ExplicitControls, HHTControls
+from skfsink.methods.explicit import Explicit
+from skfsink.methods.frequency import highest_frequency
+from skfsink.methods.hht import HHT
+from skfsink.methods.statics import Statics
 
 CASES = ["intact", "stretched", "cracked", "scattered", "stretched cracked", "stretched scattered"]
 

@@ -13,27 +13,27 @@ from pathlib import Path
 import pytest
 
 import skfsink
-from skfsink import scratch
-from skfsink.jit import sources
+from skfsink.system import scratch
+from skfsink.system.jit import sources
 
 PROBE = """
 import importlib, pkgutil
 import numpy as np, skfem
 import numba.core.dispatcher as dispatcher
-import skfsink.kernels
+import skfsink.fem.kernels
 from skfsink.material import AAA
 from skfsink.momentum import Momentum
 from skfsink.pattern import Pattern
 from skfsink.space import Space
 space = Space(skfem.MeshQuad.init_tensor(*2 * [np.linspace(0, 1, 3)]))
 for threads in (1, 2):
-    skfsink.kernels.Tiles.WORTH = 0
+    skfsink.fem.kernels.Tiles.WORTH = 0
     momentum = Momentum(space, AAA(), threads=threads)
     momentum.force(np.zeros_like(space.X))
     momentum.stiffest(np.zeros_like(space.X), np.ones_like(space.X))
 momentum.tangent(Pattern(space, 2), np.zeros_like(space.X))
 compiled = {f"{module.name}.{name}": value
-            for module in pkgutil.iter_modules(skfsink.kernels.__path__, "skfsink.kernels.")
+            for module in pkgutil.iter_modules(skfsink.fem.kernels.__path__, "skfsink.fem.kernels.")
             for name, value in vars(importlib.import_module(module.name)).items()
             if isinstance(value, dispatcher.Dispatcher) and value.signatures and value.stats.cache_path}
 print(sum(sum(d.stats.cache_misses.values()) for d in compiled.values()), *compiled)
@@ -129,7 +129,7 @@ def test_stamps_cover_what_modules_import() -> None:
 AWAY = """
 import skfsink, numpy as np
 from skfsink.material import NeoHookean, isotropic
-import skfsink.plot
+import skfsink.pictures.plot
 NeoHookean().shear_modulus
 import matplotlib
 print(isotropic._neo_hookean_law.stats.cache_path, sum(isotropic._neo_hookean_law.stats.cache_misses.values()),

@@ -8,14 +8,15 @@ import numpy as np
 import pytest
 from bodies import Fracture, box, ends, grid, grips, notched, wavy
 
-from skfsink.density import DensitySolver
-from skfsink.energy import Ledger
 from skfsink.errors import ConvergenceError, ParameterError
+from skfsink.fem.space import Space
+from skfsink.fields.density import DensitySolver
+from skfsink.fields.energy import Ledger
+from skfsink.fields.momentum import Momentum
+from skfsink.fields.state import State
 from skfsink.material import AAA, SinkLaw
-from skfsink.momentum import Momentum
-from skfsink.space import Space
-from skfsink.state import State
-from skfsink.statics import Statics, StaticsControls
+from skfsink.methods.controls import StaticsControls
+from skfsink.methods.statics import Statics
 
 LAW = SinkLaw()
 

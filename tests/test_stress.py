@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from bodies import box, wavy
 
-from skfsink import stress
+from skfsink.fem.space import Space
+from skfsink.fields import stress
+from skfsink.fields.momentum import Momentum
 from skfsink.material import AAA
-from skfsink.momentum import Momentum
-from skfsink.space import Space
 
 
 @pytest.mark.parametrize("element", ["jbar", "plain", "planestress"])

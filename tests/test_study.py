@@ -13,11 +13,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from skfsink.cli import command
-from skfsink.errors import ConvergenceError, InstabilityError, OutputError
-from skfsink.explicit import ExplicitControls
-from skfsink.progress import Display
-from skfsink.simulate import Interrupted
+from skfsink.cli.program import command
+from skfsink.errors import ConvergenceError, InstabilityError, Interrupted, OutputError
+from skfsink.methods.controls import ExplicitControls
+from skfsink.run.display import Display
 from skfsink.study import integrators, models, solvers, systems
 from skfsink.study.body import SLAB, Body, Front, first_passages
 from skfsink.study.meshes import load_plate

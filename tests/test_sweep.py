@@ -19,12 +19,13 @@ import pytest
 from PIL import Image
 from plates import invoke_program, plate
 
-import skfsink.run
+import skfsink.run.run
 import skfsink.sweep.plan
-from skfsink.deck import parameters_of, read_deck
 from skfsink.errors import OutputError, ParameterError
-from skfsink.history import History
-from skfsink.meshing import write_mesh
+from skfsink.meshing.vtu import write_mesh
+from skfsink.results.history import History
+from skfsink.scene.deck import read_deck
+from skfsink.scene.registry import parameters_of
 from skfsink.sweep.one import run_folder
 from skfsink.sweep.plan import run_sweep
 from skfsink.sweep.table import draw, read_rows, read_units, write_csv, write_parquet
@@ -256,7 +257,7 @@ def test_a_worker_that_is_killed_loses_nothing_and_repeats_nothing(
 
 def test_a_sweep_goes_on_elsewhere(deck: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if a sweep that was moved is taken for another one, needs the mesh of begun runs, or takes another mesh."""
-    monkeypatch.setattr(skfsink.run, "draw_run", lambda *_: None)
+    monkeypatch.setattr(skfsink.run.run, "draw_run", lambda *_: None)
     here, far = tmp_path / "here", tmp_path / "far"
     here.mkdir(), far.mkdir()
     for name in ("plate.vtu", "scene.toml"):

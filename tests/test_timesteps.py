@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 from bodies import Fracture, grips, notched
 
-from skfsink.density import Density, DensitySolver
 from skfsink.errors import ConvergenceError, InstabilityError
-from skfsink.explicit import Explicit, ExplicitControls
-from skfsink.hht import HHT, HHTControls
+from skfsink.fields.density import Density, DensitySolver
+from skfsink.fields.momentum import Momentum
+from skfsink.fields.state import State
 from skfsink.material import AAA, SinkLaw
-from skfsink.momentum import Momentum
-from skfsink.state import State
+from skfsink.methods.controls import ExplicitControls, HHTControls
+from skfsink.methods.explicit import Explicit
+from skfsink.methods.hht import HHT
 
 MAKERS: dict[str, Callable] = {
     "explicit": lambda *args: Explicit(*args, ExplicitControls(gamma_every=4)),

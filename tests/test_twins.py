@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import skfsink.run
+import skfsink.run.run
 from skfsink import Grip, Options, custom
-from skfsink.mesh_file import read_mesh_file
-from skfsink.meshing import write_mesh
-from skfsink.sample import file_sample
+from skfsink.meshing.mesh_file import read_mesh_file
+from skfsink.meshing.sample import file_sample
+from skfsink.meshing.vtu import write_mesh
 
 DATA = Path(__file__).parent / "data"
 REFUSED = {"plate_CAX4H", "plate_mixed_triangle", "plate_two_instances", "two_pieces", "plate_metres", "one_element"}
@@ -36,7 +36,7 @@ def history(mesh: Path, out: Path) -> bytes:
 def test_a_file_and_its_twin_in_vtu_give_the_same_bytes(path: Path, tmp_path: Path,
                                                         monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if anything of a mesh but its name depends on the format of its file."""
-    monkeypatch.setattr(skfsink.run, "draw_run", lambda *_: None)
+    monkeypatch.setattr(skfsink.run.run, "draw_run", lambda *_: None)
     twin = tmp_path / f"{path.stem}.vtu"
     write_mesh(twin, read_mesh_file(path))
     one, other = history(path, tmp_path / "one"), history(twin, tmp_path / "other")

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from bodies import box
 
-from skfsink.amg import residual
-from skfsink.density import Density, DensitySolver
-from skfsink.explicit import Explicit
+from skfsink.fem.amg import residual
+from skfsink.fem.space import Space
+from skfsink.fields.active_zone import ActiveZone
+from skfsink.fields.density import Density, DensitySolver
 from skfsink.material import SinkLaw
-from skfsink.space import Space
-from skfsink.zone import ActiveZone
+from skfsink.methods.explicit import Explicit
 
 TOLERANCE = Explicit.GAMMA_TOLERANCE
 LAW = SinkLaw(length_scale=0.02)  # the body is 1 mm wide: fifty lengths l

@@ -21,8 +21,8 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 import skfsink
-from skfsink.homogeneous import peaks
 from skfsink.material import AAA, SinkLaw
+from skfsink.material.homogeneous import peaks
 
 SIDE, RADIUS = 8.0, 0.5  # [mm]
 LAW = AAA()

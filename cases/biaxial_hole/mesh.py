@@ -8,7 +8,8 @@ from pathlib import Path
 import meshio
 import numpy as np
 
-from skfsink.meshing import Edge, SizeField, completed, mesh_outline, write_mesh
+from skfsink.meshing.outline import Edge, SizeField, completed, mesh_outline
+from skfsink.meshing.vtu import write_mesh
 
 SIDE, RADIUS = 8.0, 0.5  # of the plate and of the hole, whose centre is the origin [mm]
 TILT = math.radians(70)  # of the seam between the halves: neither a side nor a diagonal lies in it

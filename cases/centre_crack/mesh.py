@@ -7,7 +7,8 @@ from pathlib import Path
 import meshio
 import numpy as np
 
-from skfsink.meshing import Edge, SizeField, completed, mesh_outline, write_mesh
+from skfsink.meshing.outline import Edge, SizeField, completed, mesh_outline
+from skfsink.meshing.vtu import write_mesh
 
 LENGTH, HEIGHT, WIDTH = 10.0, 3.0, 0.1  # of the strip; width of the crack with its round tips [mm]
 

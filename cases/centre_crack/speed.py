@@ -15,8 +15,8 @@ import meshio
 import numpy as np
 
 import skfsink
-from skfsink.loader import Run
 from skfsink.material import Material
+from skfsink.results.loader import Run
 
 
 def waves(material: Material, along: float, across: float) -> tuple[float, float]:

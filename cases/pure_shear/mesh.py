@@ -13,7 +13,8 @@ from pathlib import Path
 import meshio
 import numpy as np
 
-from skfsink.meshing import Edge, SizeField, mesh_outline, write_mesh
+from skfsink.meshing.outline import Edge, SizeField, mesh_outline
+from skfsink.meshing.vtu import write_mesh
 
 LENGTH, HEIGHT, CUT = 10.0, 1.5, 2.0  # of the strip and of the cut [mm]
 WIDTH = 0.1                          # of the cut, whose tip is round [mm]

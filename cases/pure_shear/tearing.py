@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 
 import skfsink
-from skfsink.loader import Run
 from skfsink.material import AAA
+from skfsink.results.loader import Run
 
 START, STOP = 1.0, 2.0  # heights from the tip of the cut, and from the end of the strip, between which it is steady
 

@@ -10,10 +10,10 @@ from pathlib import Path
 
 from docstring_parser import parse
 
-from skfsink.deck import case_function
-from skfsink.history import onset_load
-from skfsink.loader import Run, load
-from skfsink.sample import data_folder
+from skfsink.results.history import onset_load
+from skfsink.results.loader import Run, load
+from skfsink.scene.registry import case_function
+from skfsink.system.shipped import data_folder
 from skfsink.units import UNITS
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -5,12 +5,13 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 from ..errors import require
-from ..layout import arrange
-from ..options import SAMPLE, Options
-from ..result import Result
-from ..run import run_case
-from ..scene import Grip, Scene
-from ..shapes import check_two_notches
+from ..loads.grips import Grip
+from ..meshing.shapes import check_two_notches
+from ..results.result import Result
+from ..run.run import run_case
+from ..scene.arrange import arrange
+from ..scene.options import SAMPLE, Options
+from ..scene.scene import Scene
 
 __all__ = ["asymmetric_double_edge_notch"]
 
@@ -48,7 +49,7 @@ def asymmetric_double_edge_notch(*, side: Annotated[float, SAMPLE] = 4.0, notch:
     mesh_seed
         Another mesh of the same sizes for each number; other than 0 it needs gmsh (the mesh extra).
     options
-        Material, analysis and controls; see :class:`~skfsink.options.Options`.
+        Material, analysis and controls; see :class:`~skfsink.scene.options.Options`.
 
     Returns
     -------
@@ -75,6 +76,6 @@ def _scene(own: dict[str, Any], options: Options) -> Scene:
 
 
 if __name__ == "__main__":
-    from ..cli import command
+    from ..cli.program import command
 
     command(asymmetric_double_edge_notch)

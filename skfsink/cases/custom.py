@@ -9,14 +9,14 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from ..errors import ParameterError
-from ..loads import Grip, Traction
-from ..options import SAMPLE, Options
-from ..regions import Region
-from ..result import Result
-from ..run import run_case
-from ..sample import file_sample
-from ..scene import Scene
-from ..tables import TABLES, RegionLaw, grip_from, grips_of, read_tables, region_from, traction_from, tractions_of
+from ..loads.grips import Grip, Traction
+from ..material.regions import Region, RegionLaw
+from ..meshing.sample import file_sample
+from ..results.result import Result
+from ..run.run import run_case
+from ..scene.options import SAMPLE, Options
+from ..scene.scene import Scene
+from ..scene.tables import TABLES, grip_from, grips_of, read_tables, region_from, traction_from, tractions_of
 
 __all__ = ["custom"]
 
@@ -54,7 +54,7 @@ def custom(*, mesh: Annotated[str, SAMPLE] = "", title: Annotated[str, SAMPLE] =
     regions
         Named sets of elements that are of another material, or of another strength.
     options
-        Material, analysis and controls; see :class:`~skfsink.options.Options`. `speed` is for the other cases.
+        Material, analysis and controls; see :class:`~skfsink.scene.options.Options`. `speed` is for the other cases.
 
     Returns
     -------
@@ -95,6 +95,6 @@ def _scene(own: dict[str, Any], options: Options) -> Scene:
 
 
 if __name__ == "__main__":
-    from ..cli import command
+    from ..cli.program import command
 
     command(custom)

@@ -6,14 +6,15 @@ import math
 from typing import Annotated, Any
 
 from ..errors import require
-from ..halving import Mirror
-from ..layout import arrange
-from ..options import SAMPLE, Options
-from ..result import Result
-from ..run import run_case
-from ..scene import Grip, Scene
-from ..shapes import check_shell
-from ..sweeping import rolled, swept, unrolled
+from ..loads.grips import Grip
+from ..meshing.shapes import check_shell
+from ..meshing.sweeping import rolled, swept, unrolled
+from ..meshing.symmetry import Mirror
+from ..results.result import Result
+from ..run.run import run_case
+from ..scene.arrange import arrange
+from ..scene.options import SAMPLE, Options
+from ..scene.scene import Scene
 
 __all__ = ["cylindrical_shell"]
 
@@ -55,7 +56,7 @@ def cylindrical_shell(*, inner_radius: Annotated[float, SAMPLE] = 1.9, thickness
     mesh_seed
         Another mesh of the same sizes for each number; other than 0 it needs gmsh (the mesh extra).
     options
-        Material, analysis and controls; see :class:`~skfsink.options.Options`.
+        Material, analysis and controls; see :class:`~skfsink.scene.options.Options`.
 
     Returns
     -------
@@ -83,6 +84,6 @@ def _scene(own: dict[str, Any], options: Options) -> Scene:
 
 
 if __name__ == "__main__":
-    from ..cli import command
+    from ..cli.program import command
 
     command(cylindrical_shell)

@@ -8,14 +8,15 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 from ..errors import require
-from ..halving import Mirror
-from ..layout import arrange
-from ..options import SAMPLE, Options
-from ..result import Result
-from ..run import run_case
-from ..scene import Grip, Scene
-from ..shapes import check_dog_bone
-from ..sweeping import swept
+from ..loads.grips import Grip
+from ..meshing.shapes import check_dog_bone
+from ..meshing.sweeping import swept
+from ..meshing.symmetry import Mirror
+from ..results.result import Result
+from ..run.run import run_case
+from ..scene.arrange import arrange
+from ..scene.options import SAMPLE, Options
+from ..scene.scene import Scene
 
 __all__ = ["dog_bone"]
 
@@ -60,7 +61,7 @@ def dog_bone(*, length: Annotated[float, SAMPLE] = 10.0, gauge_length: Annotated
     mesh_seed
         Another mesh of the same sizes for each number; other than 0 it needs gmsh (the mesh extra).
     options
-        Material, analysis and controls; see :class:`~skfsink.options.Options`.
+        Material, analysis and controls; see :class:`~skfsink.scene.options.Options`.
 
     Returns
     -------
@@ -88,6 +89,6 @@ def _scene(own: dict[str, Any], options: Options) -> Scene:
 
 
 if __name__ == "__main__":
-    from ..cli import command
+    from ..cli.program import command
 
     command(dog_bone)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from ..layout import arrange
-from ..options import SAMPLE, Options
-from ..result import Result
-from ..run import run_case
-from ..scene import Grip, Scene, choose
-from ..shapes import check_plate
+from ..loads.grips import Grip
+from ..meshing.shapes import check_plate
+from ..results.result import Result
+from ..run.run import run_case
+from ..scene.arrange import arrange
+from ..scene.controls import choose
+from ..scene.options import SAMPLE, Options
+from ..scene.scene import Scene
 
 __all__ = ["simple_shear"]
 
@@ -47,7 +49,7 @@ def simple_shear(*, side: Annotated[float, SAMPLE] = 4.0, notch: Annotated[float
     mesh_seed
         Another mesh of the same sizes for each number; other than 0 it needs gmsh (the mesh extra).
     options
-        Material, analysis and controls; see :class:`~skfsink.options.Options`.
+        Material, analysis and controls; see :class:`~skfsink.scene.options.Options`.
 
     Returns
     -------
@@ -70,6 +72,6 @@ def _scene(own: dict[str, Any], options: Options) -> Scene:
 
 
 if __name__ == "__main__":
-    from ..cli import command
+    from ..cli.program import command
 
     command(simple_shear)

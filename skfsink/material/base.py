@@ -4,7 +4,7 @@ The stored energy per reference volume is split as in Eq. (31),
 
     W(F) = k/2 (J - 1)^2 + psi(I1'),      I1' = J^(-2/3) tr(C),   C = F^T F,
 
-with `J` replaced by its element mean in the volumetric part (Eq. 12, 13; see :mod:`skfsink.kernels`).
+with `J` replaced by its element mean in the volumetric part (Eq. 12, 13; see :mod:`skfsink.fem.kernels`).
 """
 
 from __future__ import annotations

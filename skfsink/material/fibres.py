@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import ParameterError, require
-from ..jit import njit
+from ..system.jit import njit
 from .general import GeneralMaterial
 
 __all__ = ["HolzapfelGasserOgden"]

@@ -21,7 +21,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..errors import require
-from ..jit import njit
+from ..system.jit import njit
 from .base import Material
 from .compiled import GENERAL_LAW, CompiledLaw
 

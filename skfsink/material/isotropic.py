@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import require
-from ..jit import njit
+from ..system.jit import njit
 from .base import Material
 
 __all__ = ["AAA", "LOCKED", "ArrudaBoyce", "Gent", "NeoHookean", "Yeoh"]

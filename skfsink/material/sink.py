@@ -10,7 +10,7 @@ from scipy.special import gamma as gamma_function
 from scipy.special import gammaincc
 
 from ..errors import require
-from ..jit import njit
+from ..system.jit import njit
 
 __all__ = ["SinkLaw"]
 

@@ -11,8 +11,8 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..loader import Run
-from ..plot import STYLE
+from ..pictures.plot import STYLE
+from ..results.loader import Run
 
 __all__ = ["COLOURS", "Chart", "energy_chart", "loading_chart", "speed_chart"]
 

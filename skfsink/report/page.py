@@ -11,12 +11,12 @@ from pathlib import Path
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from .. import __version__
-from ..citation import BIBTEX, CITATIONS, DOI
+from .._version import __version__
 from ..errors import OutputError, SkfsinkError
-from ..files import reported, write_atomic
-from ..loader import Run, load
+from ..results.loader import Run, load
+from ..system.files import reported, write_atomic
 from . import charts
+from .citation import BIBTEX, CITATIONS, DOI
 from .scenes import command_line, differences, parameter_table, run_labels
 from .tables import EMPTY, Row, Table, cost_table, energy_tables, key_table, version_table
 

@@ -12,9 +12,9 @@ from typing import Any
 
 import docstring_parser
 
-from ..loader import Run
-from ..options import Options
-from ..tables import TABLES
+from ..results.loader import Run
+from ..scene.options import Options
+from ..scene.tables import TABLES
 from .tables import EMPTY, Row, Table
 
 __all__ = ["command_line", "differences", "meanings", "parameter_table", "run_labels"]

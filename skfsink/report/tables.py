@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ..history import onset_load
-from ..loader import ENERGIES, Run
+from ..results.history import onset_load
+from ..results.loader import ENERGIES, Run
 
 __all__ = ["Row", "Table", "cost_table", "energy_tables", "key_table", "number", "version_table"]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import skfem
 
-from ..sample import Sample
-from ..space import Space
+from ..fem.space import Space
+from ..meshing.sample import Sample
 
 __all__ = ["block", "surface", "trapezium"]
 

@@ -10,18 +10,20 @@ from typing import Any
 
 import numpy as np
 
-from ..density import Density, DensitySolver
-from ..energy import Ledger
 from ..errors import ConvergenceError, InstabilityError
-from ..explicit import Explicit, ExplicitControls
-from ..hht import HHT, HHTControls
+from ..fields.density import Density, DensitySolver
+from ..fields.energy import Ledger
+from ..fields.momentum import Momentum
+from ..fields.state import State
+from ..loads.grips import Grip
 from ..material import AAA, Material, SinkLaw
-from ..momentum import Momentum
-from ..sample import Sample
-from ..scene import Grip, Scene
-from ..simulate import onset_copy
-from ..state import State
-from ..statics import Statics, StaticsControls
+from ..meshing.sample import Sample
+from ..methods.controls import ExplicitControls, HHTControls, StaticsControls
+from ..methods.explicit import Explicit
+from ..methods.hht import HHT
+from ..methods.statics import Statics
+from ..run.simulate import onset_copy
+from ..scene.scene import Scene
 from .meshes import load_plate
 
 __all__ = ["PULLED", "SLAB", "SPEED", "Body", "Front", "Integrator", "Make", "first_passages", "warm"]

@@ -1,4 +1,4 @@
-"""Charts of the studies, in the style of :mod:`skfsink.plot`."""
+"""Charts of the studies, in the style of :mod:`skfsink.pictures.plot`."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from ..output import replaced
-from ..plot import DPI, STYLE, WIDTH
+from ..pictures.plot import DPI, STYLE, WIDTH
+from ..system.files import replaced
 from .pareto import pareto_front
 
 __all__ = ["draw_front", "listed", "page"]

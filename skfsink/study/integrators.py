@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from ..explicit import ExplicitControls
-from ..hht import HHTControls
+from ..methods.controls import ExplicitControls, HHTControls
 from .body import Body, Integrator, warm
 from .chart import draw_front, listed, page
 from .meshes import load_plate

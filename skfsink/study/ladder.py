@@ -23,14 +23,14 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from ..corridor import corridor_report, lay_corridor
 from ..errors import ParameterError
-from ..models import LADDERS, SCATTER, Ladder, ladder_path, rung
-from ..options import Options
-from ..progress import Display
-from ..quantities import crack_cells, measured
-from ..scene import Scene
-from ..simulate import Simulation
+from ..run.display import Display
+from ..run.model import LADDERS, SCATTER, Ladder, ladder_path, rung
+from ..run.quantities import crack_cells, measured
+from ..run.simulate import Simulation
+from ..run.two_pass import corridor_report, lay_corridor
+from ..scene.options import Options
+from ..scene.scene import Scene
 from .ladder_chart import draw_ladders
 from .store import Store
 
@@ -129,6 +129,6 @@ def _warm(case: str) -> None:
 
 
 if __name__ == "__main__":
-    from ..cli import command
+    from ..cli.program import command
 
     command(ladder, package="study")

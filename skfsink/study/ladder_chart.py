@@ -12,8 +12,8 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from ..models import LADDERS, REFERENCE, Ladder, ladder_path
-from ..options import QUANTITIES
+from ..run.model import LADDERS, REFERENCE, Ladder, ladder_path
+from ..scene.options import QUANTITIES
 from .chart import page
 
 __all__ = ["choices_table", "draw_ladders", "errors_table"]

@@ -7,7 +7,7 @@ import platform
 from pathlib import Path
 from typing import Any
 
-from ..output import versions
+from ..results.summary import versions
 
 __all__ = ["machine"]
 

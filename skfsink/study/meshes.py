@@ -13,10 +13,11 @@ from pathlib import Path
 import meshio
 import numpy as np
 
-from ..meshing import Edge, SizeField, completed, mesh_outline, write_mesh
-from ..sample import Sample, load_sample
-from ..shapes import single_edge_notch_mesh
-from ..sweeping import swept
+from ..meshing.outline import Edge, SizeField, completed, mesh_outline
+from ..meshing.sample import Sample, load_sample
+from ..meshing.shapes import single_edge_notch_mesh
+from ..meshing.sweeping import swept
+from ..meshing.vtu import write_mesh
 
 __all__ = ["NOTCH", "SIDE", "half_plate_mesh", "load_plate", "refined"]
 

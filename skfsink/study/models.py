@@ -13,10 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from ..explicit import ExplicitControls
-from ..hht import HHTControls
+from ..loads.grips import Grip
 from ..material import AAA
-from ..scene import Grip
+from ..methods.controls import ExplicitControls, HHTControls
 from .body import PULLED, SLAB, SPEED, Body, Integrator, warm
 from .chart import page
 from .meshes import load_plate

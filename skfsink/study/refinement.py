@@ -13,8 +13,8 @@ from typing import Any
 import meshio
 from matplotlib.axes import Axes
 
-from ..sample import Sample, load_sample
-from ..sweeping import swept
+from ..meshing.sample import Sample, load_sample
+from ..meshing.sweeping import swept
 from .body import PULLED, SLAB, Body, warm
 from .chart import draw_front, page
 from .meshes import refined

@@ -19,9 +19,9 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from ..output import write_atomic
-from ..progress import Display
-from ..simulate import Interrupted
+from ..errors import Interrupted
+from ..run.display import Display
+from ..system.files import write_atomic
 from . import integrators, refinement
 from .chart import page
 from .integrators import TIME
@@ -112,6 +112,6 @@ def draw_headline(time: Points, space: Points, path: Path) -> None:
 
 
 if __name__ == "__main__":
-    from ..cli import command
+    from ..cli.program import command
 
     command(speed_accuracy, package="study")

@@ -22,7 +22,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 from cyclopts import Parameter
 from matplotlib.axes import Axes
 
-from ..progress import Display
+from ..run.display import Display
 from . import stability_elements as elements
 from . import stability_onset as onset
 from . import stability_time as time
@@ -125,6 +125,6 @@ def _overview(points: dict[str, Points], path: Path) -> None:
 
 
 if __name__ == "__main__":
-    from ..cli import command
+    from ..cli.program import command
 
     command(stability, package="study")

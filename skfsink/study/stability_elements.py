@@ -11,15 +11,15 @@ from matplotlib.axes import Axes
 from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import cg, spsolve
 
-from ..density import SINKS, DensitySolver
 from ..errors import ConvergenceError
-from ..indicators import alternation, element_pressure
+from ..fem.indicators import alternation, element_pressure
+from ..fem.space import Space
+from ..fields.density import SINKS, DensitySolver
+from ..fields.momentum import Momentum
 from ..material import AAA, SinkLaw
-from ..momentum import Momentum
-from ..newton import Newton
-from ..plot import BLUE, RED, SAND
-from ..space import Space
-from ..statics import StaticsControls
+from ..methods.controls import StaticsControls
+from ..methods.newton import Newton
+from ..pictures.plot import BLUE, RED, SAND
 from .blocks import block, surface, trapezium
 from .part import Planned, Points
 

@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from ..deletion import delete_failed
-from ..density import DensitySolver
-from ..energy import Ledger
-from ..plot import BLUE, RED, SAND
-from ..scene import Grip
-from ..state import State
-from ..statics import Statics, StaticsControls
+from ..fields.deletion import delete_failed
+from ..fields.density import DensitySolver
+from ..fields.energy import Ledger
+from ..fields.state import State
+from ..loads.grips import Grip
+from ..methods.controls import StaticsControls
+from ..methods.statics import Statics
+from ..pictures.plot import BLUE, RED, SAND
 from .blocks import block
 from .body import SPEED, Body
 from .part import Planned, Points

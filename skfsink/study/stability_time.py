@@ -9,16 +9,16 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from ..density import DensitySolver
-from ..energy import Ledger
-from ..explicit import Explicit, ExplicitControls
-from ..frequency import highest_frequency
-from ..hht import HHTControls
+from ..fem.pattern import Pattern
+from ..fields.density import DensitySolver
+from ..fields.energy import Ledger
+from ..fields.momentum import Momentum
+from ..fields.state import State
 from ..material import AAA, SinkLaw
-from ..momentum import Momentum
-from ..pattern import Pattern
-from ..plot import BLUE, RED, SAND
-from ..state import State
+from ..methods.controls import ExplicitControls, HHTControls
+from ..methods.explicit import Explicit
+from ..methods.frequency import highest_frequency
+from ..pictures.plot import BLUE, RED, SAND
 from .blocks import block, surface
 from .body import Body
 from .part import Planned, Points

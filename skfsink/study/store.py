@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import ConvergenceError, InstabilityError, OutputError
-from ..output import write_summary
+from ..results.summary import write_summary
 from .machine import machine
 
 __all__ = ["Store"]

@@ -23,14 +23,14 @@ import scipy.sparse.linalg as sla
 import skfem
 from scipy.sparse import bsr_array, csr_array, diags_array
 
-from .. import kernels
-from ..amg import AmgCG
-from ..direct import Factorization
 from ..errors import ConvergenceError
+from ..fem import kernels
+from ..fem.amg import AmgCG
+from ..fem.direct import Factorization
+from ..fem.pattern import Pattern
+from ..fem.space import Space
+from ..fields.momentum import Momentum
 from ..material import AAA, SinkLaw
-from ..momentum import Momentum
-from ..pattern import Pattern
-from ..space import Space
 
 __all__ = ["METHODS", "OVER_TIME", "SECONDS", "System", "solve_system"]
 

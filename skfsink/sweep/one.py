@@ -12,10 +12,11 @@ from pathlib import Path
 
 from filelock import FileLock
 
-from ..deck import read_deck
 from ..errors import SkfsinkError
-from ..files import reported, write_atomic
-from ..run import SCENE, SUMMARY
+from ..run.run import SUMMARY
+from ..scene.deck import read_deck
+from ..scene.stored import SCENE
+from ..system.files import reported, write_atomic
 
 __all__ = ["DECK", "FAILURE", "RUN", "finished", "run_folder"]
 

@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from ..deck import Deck, parameters_of, read_deck
-from ..errors import OutputError, require
-from ..files import reported, write_atomic
-from ..kept_mesh import MESH
-from ..progress import Display
-from ..sample import file_sample
-from ..simulate import Interrupted
-from ..tables import split
+from ..errors import Interrupted, OutputError, require
+from ..meshing.kept_mesh import MESH
+from ..meshing.sample import file_sample
+from ..run.display import Display
+from ..scene.deck import Deck, read_deck
+from ..scene.registry import parameters_of
+from ..scene.tables import split
+from ..system.files import reported, write_atomic
 from .engine import here, on_scheduler
 from .one import DECK, FAILURE, RUN, finished
 from .table import draw, read_rows, read_units, write_csv, write_parquet

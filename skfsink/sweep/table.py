@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import MissingExtra
-from ..files import replaced, write_atomic
-from ..history import History, history_units, onset_load
+from ..results.history import History, history_units, onset_load
+from ..system.files import replaced, write_atomic
 from .one import FAILURE, RUN
 
 if TYPE_CHECKING:

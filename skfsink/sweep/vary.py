@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ..deck import read_value
 from ..errors import ParameterError
+from ..scene.deck import read_value
 
 __all__ = ["combinations", "read_variation"]
 

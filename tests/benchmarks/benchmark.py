@@ -29,16 +29,16 @@ import numpy as np
 import skfem
 from limits import FORCE_BYTES, STEP_BYTES, limits, reached
 
-from skfsink import kernels
-from skfsink.density import Density, DensitySolver
-from skfsink.explicit import Explicit
-from skfsink.forms import momentum_forms
+from skfsink.fem import kernels
+from skfsink.fem.forms import momentum_forms
+from skfsink.fem.pattern import Pattern
+from skfsink.fem.space import Space
+from skfsink.fields.density import Density, DensitySolver
+from skfsink.fields.momentum import Momentum
+from skfsink.fields.state import State
 from skfsink.material import AAA, SinkLaw
-from skfsink.momentum import Momentum
-from skfsink.pattern import Pattern
-from skfsink.sample import Sample, load_sample
-from skfsink.space import Space
-from skfsink.state import State
+from skfsink.meshing.sample import Sample, load_sample
+from skfsink.methods.explicit import Explicit
 from skfsink.study.machine import machine
 
 HERE = Path(__file__).resolve().parent
@@ -222,7 +222,7 @@ def start_up() -> dict[str, Any]:
     probe = ("from pathlib import Path; from skfsink import simulate as s; step = s.Simulation._pause\n"
              "def first(*a): raise SystemExit(0)\n"
              "s.Simulation._pause = first\n"
-             "from skfsink.cases.single_edge_notch import single_edge_notch; from skfsink.options import Options\n"
+             "from skfsink import Options; from skfsink.cases.single_edge_notch import single_edge_notch\n"
              "single_edge_notch(mesh='coarse', options=Options(out=Path('{}'), quiet=True))")
 
     def once(cache: str) -> float:

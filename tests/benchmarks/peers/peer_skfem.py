@@ -1,4 +1,4 @@
-"""scikit-fem: forms for Q1/P0 with the pressure condensed, and the single form of `skfsink.forms`."""
+"""scikit-fem: forms for Q1/P0 with the pressure condensed, and the single form of `skfsink.fem.forms`."""
 
 from __future__ import annotations
 
@@ -61,10 +61,10 @@ class CondensedPardiso(Condensed):
 
 
 class OneForm(Condensed):
-    """`skfsink.forms`: J_bar by a mean over the element inside the form."""
+    """`skfsink.fem.forms`: J_bar by a mean over the element inside the form."""
 
     def __init__(self, problem: Problem) -> None:
-        from skfsink.forms import momentum_forms
+        from skfsink.fem.forms import momentum_forms
         from skfsink.material import AAA
 
         super().__init__(problem)

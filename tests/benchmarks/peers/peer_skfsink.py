@@ -10,10 +10,10 @@ from measure import Clock, Peer
 from problem import Problem
 from skfem.io.meshio import INV_HEX_MAPPING
 
+from skfsink.fem.space import Space
+from skfsink.fields.momentum import Momentum
 from skfsink.material import AAA
-from skfsink.momentum import Momentum
-from skfsink.newton import Newton
-from skfsink.space import Space
+from skfsink.methods.newton import Newton
 
 __all__ = ["PEERS"]
 

@@ -43,7 +43,7 @@ PEERS = {
     "felupe": "FElupe",
     "skfem:pardiso": "scikit-fem, PARDISO",
     "skfem": "scikit-fem",
-    "skfem:one-form": "scikit-fem, `skfsink.forms`",
+    "skfem:one-form": "scikit-fem, `skfsink.fem.forms`",
     "tatva:pardiso": "tatva, PARDISO",
     "tatva": "tatva",
     "sfepy": "SfePy",

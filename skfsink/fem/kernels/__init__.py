@@ -1,0 +1,20 @@
+"""Compiled element loops: the weak forms of :mod:`skfsink.fem.forms`, equal to them to rounding and used by every run.
+
+force2d, force3d   internal force, stored energy and its density; explicit steps spend their time here
+volumetric         the indicator of the highest frequency, from passes of these two
+tiles              the memory layout those two work on, a region of the body after the other
+tangent            tangent stiffness with material, geometric and J_bar coupling
+general, general_tangent   force and tangent for laws of several invariants, and fibres
+plane_stress       all of these for thin sheets
+pieces             elements of a region for the second derivatives
+scalar             mass, Laplacian and sink matrices
+"""
+
+from .general_tangent import tangent_general
+from .plane_stress import tangent_plane_stress
+from .scalar import laplacian, mass, weighted_mass
+from .tangent import ERSATZ_STIFFNESS, SOFT_GAMMA, tangent
+from .tiles import Law, Tiles
+
+__all__ = ["ERSATZ_STIFFNESS", "SOFT_GAMMA", "Law", "Tiles", "laplacian", "mass", "tangent",
+           "tangent_general", "tangent_plane_stress", "weighted_mass"]

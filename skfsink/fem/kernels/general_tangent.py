@@ -1,0 +1,233 @@
+"""Tangent for stored energies of several invariants, from the modulus at each Gauss point.
+
+With A_iJkL the second derivative of  w gamma psi + w p J  at fixed p, one element gives
+
+    K_ai,bk = gamma_bar k V b b^T + sum_q (Grad N_a)_J A_iJkL (Grad N_b)_L.
+
+With `convex` the negative eigenvalues of every A, a matrix (dim^2, dim^2), are set to zero: the tangent is then
+positive semidefinite at every point, and unchanged where no point is unstable.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ...material import GeneralMaterial
+from ...system.jit import njit
+from ..pattern import Pattern
+from ..space import Space
+from .lanes import J_FLOOR
+from .pieces import pieces
+from .tangent import ERSATZ_STIFFNESS, SOFT_GAMMA
+
+__all__ = ["tangent_general"]
+
+
+def tangent_general(space: Space, pattern: Pattern, material: GeneralMaterial, u: np.ndarray, gamma: np.ndarray,
+                    fibres: np.ndarray, j_bar: bool = True, convex: bool = False,
+                    elements: np.ndarray | None = None) -> np.ndarray:
+    """Data of the tangent on `pattern`, as :func:`.tangent.tangent`.
+
+    `fibres` (number of `elements`, families, 3) are directions.
+    """
+    data, x = np.zeros(pattern.nnz), space.X + u
+    loop = _tangent_2d if space.dim == 2 else _tangent_3d
+    for conn, dN, w, at_gauss, slot, directions in pieces(space, pattern, gamma, elements, fibres):
+        loop(material.compiled_law, material.constants, material.bulk_modulus, material.shear_modulus, conn, x, dN, w,
+             at_gauss, directions, j_bar, convex, slot, data)
+    return data
+
+
+@njit
+def _cofactor(F, G):  # type: ignore[no-untyped-def]
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        G[i, 0] = F[j, 1] * F[k, 2] - F[j, 2] * F[k, 1]
+        G[i, 1] = F[j, 2] * F[k, 0] - F[j, 0] * F[k, 2]
+        G[i, 2] = F[j, 0] * F[k, 1] - F[j, 1] * F[k, 0]
+
+
+@njit
+def _slopes(F, G, C, B, n, tr, X):  # type: ignore[no-untyped-def]
+    """Slopes X_F (m, 3, 3) of the plain invariants, C and B = F F^T; n (m, 2, 3) holds F A and A of each family."""
+    for i in range(3):
+        for j in range(3):
+            C[i, j] = F[0, i] * F[0, j] + F[1, i] * F[1, j] + F[2, i] * F[2, j]
+            B[i, j] = F[i, 0] * F[j, 0] + F[i, 1] * F[j, 1] + F[i, 2] * F[j, 2]
+    for i in range(3):
+        for j in range(3):
+            X[0, i, j] = 2.0 * F[i, j]
+            X[1, i, j] = 2.0 * (tr * F[i, j] - F[i, 0] * C[0, j] - F[i, 1] * C[1, j] - F[i, 2] * C[2, j])
+            for f in range(2, X.shape[0]):
+                X[f, i, j] = 2.0 * n[f, 0, i] * n[f, 1, j]
+
+
+@njit
+def _modulus(dim, F, G, C, B, n, tr, R, I, d, dd, X, wg, pressure, volume, A):  # type: ignore[no-untyped-def]
+    """A_iJkL in the rows dim i + J; `pressure` is w p J, and `volume` multiplies G_iJ G_kL besides.
+
+    X holds the slopes of the plain invariants, and afterwards those of the isochoric ones.
+    """
+    m = X.shape[0]
+    square, direct = 0.0, 0.0      # factors of G_iJ G_kL and G_iL G_kJ
+    for a in range(m):
+        p = 4.0 / 3.0 if a == 1 else 2.0 / 3.0
+        square += d[a] * p * p * I[a]
+        direct += d[a] * p * I[a]
+    square = wg * square + pressure + volume
+    direct = wg * direct - pressure
+    unit = 2.0 * wg * (d[0] * R + d[1] * R * R * tr)
+    e = 2.0 * wg * d[1] * R * R
+    for i in range(dim):
+        for J in range(dim):
+            row = dim * i + J
+            for k in range(dim):
+                for L in range(dim):
+                    s = square * G[i, J] * G[k, L] + direct * G[i, L] * G[k, J]
+                    s += e * (2.0 * F[i, J] * F[k, L] - F[i, L] * F[k, J])
+                    mixed = 2.0 / 3.0 * d[0] * R * (X[0, i, J] * G[k, L] + G[i, J] * X[0, k, L])
+                    mixed += 4.0 / 3.0 * d[1] * R * R * (X[1, i, J] * G[k, L] + G[i, J] * X[1, k, L])
+                    for f in range(2, m):
+                        mixed += 2.0 / 3.0 * d[f] * R * (X[f, i, J] * G[k, L] + G[i, J] * X[f, k, L])
+                    s -= wg * mixed
+                    if i == k:
+                        s -= e * C[J, L]
+                        for f in range(2, m):
+                            s += 2.0 * wg * d[f] * R * n[f, 1, J] * n[f, 1, L]
+                        if J == L:
+                            s += unit
+                    if J == L:
+                        s -= e * B[i, k]
+                    A[row, dim * k + L] = s
+    for a in range(m):
+        p = 4.0 / 3.0 if a == 1 else 2.0 / 3.0
+        scale = R * R if a == 1 else R
+        plain = I[a] / scale
+        for i in range(dim):
+            for J in range(dim):
+                X[a, i, J] = scale * (X[a, i, J] - p * plain * G[i, J])
+    for a in range(m):
+        for c in range(m):
+            if dd[a, c] != 0.0:
+                factor = wg * dd[a, c]
+                for row in range(dim * dim):
+                    s = factor * X[a, row // dim, row % dim]
+                    for column in range(dim * dim):
+                        A[row, column] += s * X[c, column // dim, column % dim]
+
+
+@njit
+def _project(A):  # type: ignore[no-untyped-def]
+    """Sets the negative eigenvalues of the symmetric matrix A to zero."""
+    values, vectors = np.linalg.eigh(A)
+    for r in range(values.size):
+        if values[r] < 0.0:
+            for i in range(values.size):
+                for j in range(values.size):
+                    A[i, j] -= values[r] * vectors[i, r] * vectors[j, r]
+
+
+def _make(dim: int) -> Callable[..., Any]:
+    """The element loop for one dimension, with its sizes as constants."""
+    na = 2**dim
+    nd, n2 = na * dim, dim * dim
+
+    @njit(cache=True, nogil=True)
+    def loop(law, constants, k_bulk, mu, conn, x, dN, w, gamma, fibres, j_bar, convex, slot, data):  # type: ignore[no-untyped-def]
+        m = 2 + fibres.shape[1]
+        K, A, T = np.empty((nd, nd)), np.empty((n2, n2)), np.empty((n2, dim))
+        F, G, b = np.zeros((na, 3, 3)), np.empty((na, 3, 3)), np.empty(nd)
+        C, B, X, n = np.empty((3, 3)), np.empty((3, 3)), np.empty((m, 3, 3)), np.zeros((na, m, 2, 3))
+        J, tr, R, psi = np.empty(na), np.empty(na), np.empty(na), np.empty(na)
+        I, d, dd = np.empty((m, na)), np.zeros((m, na)), np.zeros((m, m, na))
+        F[:, 2, 2] = 1.0
+        for e in range(conn.shape[0]):
+            K[:] = 0.0
+            b[:] = 0.0
+            V, mean, gamma_bar = 0.0, 0.0, 0.0
+            for q in range(na):
+                for i in range(dim):
+                    for j in range(dim):
+                        s = 0.0
+                        for a in range(na):
+                            s += x[conn[e, a], i] * dN[e, q, a, j]
+                        F[q, i, j] = s
+                _cofactor(F[q], G[q])
+                J[q] = F[q, 0, 0] * G[q, 0, 0] + F[q, 0, 1] * G[q, 0, 1] + F[q, 0, 2] * G[q, 0, 2]
+                R[q] = max(J[q], J_FLOOR) ** (-2.0 / 3.0)
+                t, second = 0.0, 0.0
+                for i in range(3):
+                    for j in range(3):
+                        t += F[q, i, j] * F[q, i, j]
+                        second += G[q, i, j] * G[q, i, j]
+                tr[q] = t
+                I[0, q], I[1, q] = R[q] * t, R[q] * R[q] * second
+                for f in range(2, m):
+                    s = 0.0
+                    for i in range(3):
+                        r = 0.0
+                        for j in range(3):
+                            r += F[q, i, j] * fibres[e, f - 2, j]
+                        n[q, f, 0, i], n[q, f, 1, i] = r, fibres[e, f - 2, i]
+                        s += r * r
+                    I[f, q] = R[q] * s
+                for a in range(na):
+                    for i in range(dim):
+                        s = 0.0
+                        for j in range(dim):
+                            s += G[q, i, j] * dN[e, q, a, j]
+                        b[dim * a + i] += w[e, q] * s
+                G[q] /= max(J[q], J_FLOOR)
+                V += w[e, q]
+                mean += w[e, q] * J[q]
+                gamma_bar += w[e, q] * gamma[e, q]
+            mean /= V
+            gamma_bar /= V
+            law(I, constants, psi, d, dd)
+            if j_bar:
+                factor = gamma_bar * k_bulk / V
+                for i in range(nd):
+                    for j in range(i, nd):
+                        K[i, j] = factor * b[i] * b[j]
+            for q in range(na):
+                wg = w[e, q] * gamma[e, q]
+                if j_bar:
+                    pressure, volume = w[e, q] * gamma_bar * k_bulk * (mean - 1.0) * J[q], 0.0
+                else:
+                    pressure, volume = wg * k_bulk * (J[q] - 1.0) * J[q], wg * k_bulk * max(J[q], J_FLOOR) ** 2
+                _slopes(F[q], G[q], C, B, n[q], tr[q], X)
+                _modulus(dim, F[q], G[q], C, B, n[q], tr[q], R[q], I[:, q], d[:, q], dd[:, :, q], X, wg, pressure,
+                         volume, A)
+                if convex:
+                    _project(A)
+                if gamma[e, q] < SOFT_GAMMA:
+                    for i in range(n2):
+                        A[i, i] += w[e, q] * ERSATZ_STIFFNESS * mu
+                for bb in range(na):
+                    for row in range(n2):
+                        for k in range(dim):
+                            s = 0.0
+                            for L in range(dim):
+                                s += A[row, dim * k + L] * dN[e, q, bb, L]
+                            T[row, k] = s
+                    for a in range(bb + 1):
+                        for i in range(dim):
+                            for k in range(dim):
+                                s = 0.0
+                                for j in range(dim):
+                                    s += dN[e, q, a, j] * T[dim * i + j, k]
+                                K[dim * a + i, dim * bb + k] += s
+            for i in range(nd):
+                for j in range(nd):
+                    k = slot[e, i, j]
+                    if k >= 0:
+                        data[k] += K[i, j] if i <= j else K[j, i]
+
+    return loop
+
+
+_tangent_2d = _make(2)
+_tangent_3d = _make(3)

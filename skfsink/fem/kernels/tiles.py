@@ -1,0 +1,218 @@
+"""Element data in tiles of neighbouring elements, so that the force loops run on whole vector registers.
+
+Element e sits in lane e % lanes of tile e // lanes. An array with `rows` numbers for each element is stored as
+(tiles, rows, lanes): the same number of neighbouring elements is contiguous, and one tile's working set stays in the
+first-level cache. The last tile is filled up with copies of the last element that carry gamma = 0 and are never read.
+Each part of a body of several materials has tiles of its own, its elements in ascending order and its last tile filled
+up: the loops run over one part after the other, and the sums at the nodes over all.
+
+Bytes an explicit step has to move for one quadrilateral (hexahedron): 16 (32) connectivity, 160 (640) geometry,
+32 (64) gamma, 32 (64) energy density written, 64 (192) force written and read again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numba
+import numpy as np
+
+from ...material import CompiledLaw
+from ...system.jit import njit
+from ..space import Space
+from .faster import Faster
+from .lanes import LANES, LANES_3D
+from .plane_stress import stiffness_plane_stress
+from .relax import relax
+from .shared import FORCES, GENERAL_FORCES, VOLUMETRIC
+
+__all__ = ["Law", "Tiles"]
+
+Loops = tuple[Callable[..., float], Callable[..., None]]   # for one thread, and for several
+
+
+class Law(NamedTuple):
+    """Stored energy as the loops take it: psi, its constants, and the bulk modulus [MPa]."""
+
+    psi: CompiledLaw
+    constants: np.ndarray
+    bulk_modulus: float
+
+
+class _Part(NamedTuple):
+    """Tiles of the elements of one material, parts of the arrays of the whole body."""
+
+    loops: Loops
+    conn: np.ndarray
+    geometry: np.ndarray
+    gamma: np.ndarray
+    fibres: tuple[np.ndarray, ...]
+    force: np.ndarray
+    W: np.ndarray
+    psi: np.ndarray
+
+
+class Tiles:
+    """Tiled copy of a space's geometry, and the internal force evaluated on it.
+
+    Memory: the densities last given to `set_gamma` or `relax`, of which `force` and `volumetric` are, and the results
+    of the last evaluation; `tile`, `untile`, `set_gamma` and `relax` depend on no earlier call but for the energy that
+    `relax` returns, which is of the last evaluation.
+
+    Attributes
+    ----------
+    gamma: relative density at the Gauss points as the force uses it, tiled; set with :meth:`set_gamma`.
+    W: stored energy density of Eq. (31) [MPa] at the last evaluation, tiled.
+    psi: gamma-weighted stored energy of each element [N mm, or N mm/mm in 2D] at the last evaluation, (tiles, lanes).
+    lanes: elements in a tile.
+
+    `parts` divides the body by materials: for each its elements (None for all), and None, or for a law of several
+    invariants, in plane strain or space, the directions of its fibres (elements, families, 3).
+
+    The loops over tiles are shared by `threads` threads, those of the machine at the most, where that is faster (see
+    :class:`.Faster`) and the body has `WORTH` Gauss points; results do not depend on it.
+    """
+
+    WORTH = 20_000
+
+    def __init__(self, space: Space, plane_stress: bool = False, threads: int = 1,
+                 parts: Sequence[tuple[np.ndarray | None, np.ndarray | None]] = ((None, None),)) -> None:
+        self.space = space
+        ne, na, dim = space.n_elements, space.conn.shape[1], space.dim
+        self.lanes = LANES if dim == 2 else LANES_3D
+        ends = self._arrange([elements for elements, _ in parts])
+        geometry = np.concatenate([space.invJ.reshape(ne, na, dim * dim), space.w[:, :, None]], axis=2)
+        self.conn = self.tile(space.conn).astype(np.uint32)
+        self.geometry = self.tile(geometry.transpose(0, 2, 1).reshape(ne, -1))  # by component, then Gauss point
+        self.gamma = np.zeros((self.count, na, self.lanes))
+        self.W = np.zeros((self.count, na, self.lanes))
+        self.psi = np.zeros((self.count, self.lanes))
+        self._force = np.zeros((self.count, na * dim, self.lanes))
+        self._parts = [_Part(
+            FORCES[0 if plane_stress else dim] if fibres is None else GENERAL_FORCES[dim],
+            self.conn[a:b], self.geometry[a:b], self.gamma[a:b],
+            () if fibres is None else (_in_tiles(fibres.reshape(len(fibres), -1), self.lanes),),
+            self._force[a:b], self.W[a:b], self.psi[a:b]) for (_, fibres), a, b in zip(parts, ends[:-1], ends[1:])]
+        most: int = numba.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]
+        self.threads = 1 if space.w.size < self.WORTH else min(threads, most)
+        self._faster: dict[object, Faster] = {}
+        start, entry = space.incidence
+        element, local = np.divmod(entry, na)
+        tile, lane = np.divmod(np.arange(self.count * self.lanes)[self._place][element], self.lanes)
+        self._start = start.astype(np.uint32)
+        self._offset = (((tile * na + local) * dim) * self.lanes + lane).astype(np.uint32)
+
+    def _arrange(self, parts: Sequence[np.ndarray | None]) -> list[int]:
+        """Give each element its lane; tiles at which the parts begin, and the number of all."""
+        ne, lanes = self.space.n_elements, self.lanes
+        ends = [0]
+        for elements in parts:
+            ends.append(ends[-1] - (-(ne if elements is None else elements.size) // lanes))
+        self.count = ends[-1]
+        self._place: slice | np.ndarray = slice(0, ne)   # of the elements among all lanes
+        self._element: np.ndarray | None = None          # in each lane, if they are not in order
+        if len(parts) > 1:
+            self._place, self._element = np.empty(ne, np.int64), np.empty(self.count * lanes, np.int64)
+            for elements, first, end in zip(parts, ends[:-1], ends[1:]):
+                assert elements is not None
+                self._place[elements] = first * lanes + np.arange(elements.size)
+                self._element[first * lanes:end * lanes] = elements[-1]
+                self._element[self._place[elements]] = elements
+        return ends
+
+    def tile(self, values: np.ndarray) -> np.ndarray:
+        """(ne, rows) as tiles (count, rows, lanes)."""
+        return _in_tiles(values if self._element is None else values[self._element], self.lanes)
+
+    def untile(self, values: np.ndarray) -> np.ndarray:
+        """Tiles (count, rows, lanes) back as (ne, rows)."""
+        return np.ascontiguousarray(values.transpose(0, 2, 1)).reshape(-1, values.shape[1])[self._place]
+
+    def set_gamma(self, gamma: np.ndarray) -> None:
+        """Give the force loops new relative densities at the Gauss points, (ne, nq)."""
+        used = np.zeros((self.count, 1, self.lanes), bool)
+        used.reshape(-1)[self._place] = True
+        self.gamma[...] = np.where(used, self.tile(gamma), 0.0)
+
+    def relax(self, nodal: np.ndarray, deleted: np.ndarray, floor: float) -> float:
+        """Give the force loops the Q1 field with nodal values (n,), zero below `floor` and in `deleted` elements (ne,).
+
+        Returns the energy [N mm, or N mm/mm in 2D] its fall takes from the stored energy of the last evaluation.
+        """
+        gone = np.ones((self.count, self.lanes), bool)
+        gone.reshape(-1)[self._place] = deleted
+        return float(relax(self.conn, nodal, self.space.N, gone, floor, self.geometry, self.W, self.gamma))
+
+    def force(self, x: np.ndarray, laws: Sequence[Law], out: np.ndarray, j_bar: bool = True) -> float:
+        """Internal force (Eq. 17) at the positions `x` (n, dim) [mm] into `out` (n, dim) [N, or N/mm in 2D].
+
+        `laws` are those of the parts. Fills `W` and `psi`, and returns the least J at a Gauss point with gamma > 0.
+        `j_bar=False` takes J instead of its element mean (the plain element, which locks).
+        """
+        least = 1.0
+        for number, (law, part) in enumerate(zip(laws, self._parts)):
+            least = min(least, *self._share(part.loops, number, *law, part.conn, x, part.geometry, part.gamma,
+                                            *part.fibres, j_bar, part.force, part.W, part.psi))
+        _sum_at_nodes(self._force.reshape(-1), self._start, self._offset, self.lanes, out)
+        return least
+
+    def _share(self, loops: Loops, part: int, *arguments: object) -> list[float]:
+        """What the shares of a loop return, from one thread or several, whichever was faster when last compared."""
+        single, shared = loops
+        if self.threads == 1:
+            return [float(single(*arguments))]
+        numba.set_num_threads(self.threads)
+        results = np.empty(self.threads)
+        choice = self._faster.setdefault((single, part), Faster())
+        with choice as several:
+            if not several:
+                return [float(single(*arguments))]
+            shared(*arguments, results)
+        return [float(result) for result in results]
+
+    def volumetric(self, x: np.ndarray, bulk_moduli: Sequence[float], inverse_mass: np.ndarray) -> float:
+        """Greatest k gamma_bar V |b|^2_(1/m) of an element, b = dJ_bar/du, at `x`: a frequency squared [1/s^2].
+
+        `bulk_moduli` are those of the parts; `inverse_mass` (n, dim) is zero where a degree of freedom is held.
+        """
+        loops = VOLUMETRIC[self.space.dim]
+        return max(k * max(self._share(loops, number, part.conn, x, part.geometry, part.gamma, inverse_mass))
+                   for number, (k, part) in enumerate(zip(bulk_moduli, self._parts)))
+
+    def plane_stiffness(self, x: np.ndarray, laws: Sequence[Law], inverse_mass: np.ndarray) -> float:
+        """What :meth:`volumetric` is, for plane stress, where nothing resists a change of area but shear."""
+        return max(float(stiffness_plane_stress(*law, part.conn, x, part.geometry, part.gamma, inverse_mass))
+                   for law, part in zip(laws, self._parts))
+
+    def mean_force(self) -> float:
+        """Mean magnitude of the forces the elements exert on their nodes, by component, at the last evaluation.
+
+        Unlike the sums at the nodes it does not vanish in equilibrium, so it says what a small residual is.
+        """
+        _, rows, _ = self._force.shape
+        return float(np.abs(self._force).sum()) / (rows * self.space.n_elements)
+
+
+def _in_tiles(values: np.ndarray, lanes: int) -> np.ndarray:
+    """(m, rows) as tiles (-(-m // lanes), rows, lanes), filled up with the last row."""
+    full = np.concatenate([values, np.repeat(values[-1:], -len(values) % lanes, axis=0)])
+    return np.ascontiguousarray(full.reshape(len(full) // lanes, lanes, -1).transpose(0, 2, 1))
+
+
+@njit(cache=True)
+def _sum_at_nodes(local, start, offset, lanes, out):  # type: ignore[no-untyped-def]
+    n, dim = out.shape
+    two = np.uint32(2 * lanes)
+    for a in range(n):
+        f0, f1, f2 = 0.0, 0.0, 0.0
+        for k in range(start[a], start[a + 1]):
+            at = offset[k]
+            f0 += local[at]
+            f1 += local[at + np.uint32(lanes)]
+            if dim == 3:
+                f2 += local[at + two]
+        out[a, 0] = f0
+        out[a, 1] = f1
+        if dim == 3:
+            out[a, 2] = f2

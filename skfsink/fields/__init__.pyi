@@ -1,0 +1,10 @@
+from .crack import CrackTracker as CrackTracker
+from .crack import Tips as Tips
+from .density import Density as Density
+from .density import DensitySolver as DensitySolver
+from .energy import Ledger as Ledger
+from .momentum import Momentum as Momentum
+from .state import State as State
+from .stress import cauchy_stress as cauchy_stress
+from .stress import pressure as pressure
+from .stress import von_mises as von_mises

@@ -1,0 +1,61 @@
+"""Failed elements: deleted when the relative density is spent at every Gauss point (Sec. 4)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..fem.space import Space
+from ..system.jit import njit
+from .momentum import Momentum
+from .state import State
+
+__all__ = ["delete_failed", "left_in"]
+
+
+def delete_failed(space: Space, state: State, threshold: float, failure_energy: float | np.ndarray) -> np.ndarray:
+    """Mark the elements that failed since the last accepted state; returns their numbers, ascending.
+
+    An element fails when gamma <= `threshold` at all its Gauss points. It is logged with the time, and its area
+    (volume) times psi_f, a number or one for each element (ne,), is added to U (Eq. 30). Call it on accepted states
+    only: a trial that is given up must not leave holes.
+    """
+    failed = np.flatnonzero(_spent(state.gamma, space.nodes, space.N, threshold, state.deleted))
+    if failed.size:
+        state.deleted[failed] = True
+        state.deletions.extend((state.time, int(e)) for e in failed)
+        if isinstance(failure_energy, np.ndarray):
+            state.ledger.paper += float(failure_energy[failed] @ space.V[failed])
+        else:
+            state.ledger.paper += failure_energy * float(space.V[failed].sum())
+    return failed
+
+
+def left_in(momentum: Momentum, gamma: np.ndarray, failed: np.ndarray) -> float:
+    """Stored energy [N mm; N mm/mm in 2D] that the elements `failed` still bear at the nodal density `gamma` (n,).
+
+    It is that of the last force evaluation, and zero where `gamma` is below the force floor at all Gauss points, as
+    with the defaults: elements that fail bear no force any more.
+    """
+    at_gauss = momentum.effective(gamma, np.zeros(momentum.space.n_elements, bool))[failed]
+    if not at_gauss.any():
+        return 0.0
+    return float(np.einsum("eq,eq,eq->", momentum.space.w[failed], at_gauss, momentum.W[failed]))
+
+
+@njit(cache=True)
+def _spent(nodal, conn, N, threshold, deleted):  # type: ignore[no-untyped-def]
+    """Mask of the elements, not yet deleted, whose Q1 field is at most `threshold` at all Gauss points."""
+    out = np.zeros(conn.shape[0], np.bool_)
+    nq, na = N.shape
+    for e in range(conn.shape[0]):
+        if deleted[e]:
+            continue
+        out[e] = True
+        for q in range(nq):
+            value = 0.0
+            for a in range(na):
+                value += N[q, a] * nodal[conn[e, a]]
+            if value > threshold:
+                out[e] = False
+                break
+    return out

@@ -1,0 +1,211 @@
+"""The relative density: history of the stored energy, and the solve of the mass balance for gamma (Eq. 6-10, 20-24).
+
+    int l^2 Grad gamma . Grad dgamma + gamma dgamma/(H + eps) = int dgamma
+
+With `sink="lumped"` (the default) the sink term is lumped by row sums: the matrix is an M-matrix wherever the
+Laplacian's off-diagonals are not positive, and then 0 < gamma <= 1. "consistent" is the paper's form, whose sink
+varies by 1e15 inside an element: gamma dips below zero next to a crack and conjugate gradients stall, so it is
+factorised. "nearest" gives each Gauss point to the node next to it.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from ..errors import ConvergenceError, ParameterError
+from ..fem import kernels
+from ..fem.amg import AmgCG
+from ..fem.direct import Factorization
+from ..fem.pattern import Pattern
+from ..fem.space import Space
+from ..material import SinkLaw
+from ..material.regions import Region, by_element, check_lengths, rest_of
+from ..system.jit import njit
+from .active_zone import ActiveZone, Zone
+
+__all__ = ["SINKS", "Density", "DensitySolver"]
+
+SINKS = ("lumped", "consistent", "nearest")
+log = logging.getLogger(__name__)
+
+
+class Density(NamedTuple):
+    """The relative density of a state, with what it was found from.
+
+    It belongs to its state: a method that gives up a step goes back to the one of the state before.
+
+    Attributes
+    ----------
+    gamma: nodal values, (n,).
+    sink: coefficients 1/(H + eps) whose solution gamma is, (ne, nq); None if that is not known.
+    zones: active zones in which it was found, to look in first the next time (see :mod:`.active_zone`).
+    """
+
+    gamma: np.ndarray
+    sink: np.ndarray | None = None
+    zones: tuple[Zone, ...] = ()
+
+
+class DensitySolver:
+    """Solves for the nodal gamma, given the greatest stored energy W each Gauss point has seen.
+
+    Its solutions are functions of the arguments alone: what it keeps between calls are counts.
+
+    Memory: counts, the `residual` of the last solve and the analysis of the matrix (`factorisations`). `solve` and
+    `update` depend on no earlier call.
+
+    Parameters
+    ----------
+    space: the spaces.
+    law: sink and flux parameters, of the elements that are in no region.
+    sink: one of `SINKS`.
+    unchanged: a solve is left out when no sink coefficient moved by more than this, relatively, since the last one.
+    active_zone: solves with a tolerance of their own are made where gamma changes (see :mod:`.active_zone`).
+    regions: elements with limiters of their own; the length l and epsilon are those of `law`.
+
+    Attributes
+    ----------
+    phi, failure_energy: Phi and psi_f [MPa], numbers, or where regions differ one for each element, (ne, 1) and (ne,).
+    solves, skipped: how often it was solved, and left out because H had not changed.
+    iterations: conjugate-gradient iterations so far.
+    fallbacks: solves in which AMG-CG did not converge and the matrix was factorised instead.
+    """
+
+    def __init__(self, space: Space, law: SinkLaw, sink: str = "lumped", tolerance: float = 1e-8,
+                 unchanged: float = 1e-12, active_zone: bool = True, regions: Sequence[Region] = ()) -> None:
+        if sink not in SINKS:
+            raise ParameterError(f"sink must be one of {', '.join(SINKS)}; got {sink!r}")
+        self.space, self.law, self.sink = space, law, sink
+        self.unchanged = unchanged
+        check_lengths(law, regions)
+        ne = space.n_elements
+        self._parts = [(rest_of(regions, ne), law), *((region.elements, region.sink_law) for region in regions)]
+        phi = by_element(ne, law.phi, regions, lambda region: region.sink_law.phi)
+        self.phi = phi[:, None] if isinstance(phi, np.ndarray) else phi
+        self.failure_energy = by_element(ne, law.failure_energy, regions, lambda region: region.sink_law.failure_energy)
+        self.pattern = Pattern(space)
+        self.load = self._lump(np.ones_like(space.w))
+        self._laplacian = kernels.laplacian(space, self.pattern, law.length_scale**2)
+        self._data, self._laplacian_diagonal = self._laplacian.copy(), self._laplacian[self.pattern.diagonal]
+        self._direct: Factorization | None = None
+        self._amg = AmgCG(self.pattern.matrix(self._assemble(np.ones_like(space.w))), tolerance)
+        self.zone = ActiveZone(space.X, law.length_scale, self._amg) if active_zone and sink != "consistent" else None
+        self._residual = 0.0
+        self.solves = self.skipped = self.iterations = self.fallbacks = 0
+
+    @property
+    def residual(self) -> float:
+        """True relative residual of the last iterative solve, over the whole body."""
+        return self._residual
+
+    @property
+    def _error(self) -> float:
+        """Bound of the error of gamma: A^-1 is positive, and A carries gamma = 1 to at least the load."""
+        return 1e-9 + self._residual * float(np.linalg.norm(self.load) / self.load.min())
+
+    @property
+    def factorisations(self) -> int:
+        """Numerical factorisations made so far."""
+        return 0 if self._direct is None else self._direct.count
+
+    def solve(self, W_max: np.ndarray, gamma: np.ndarray, tolerance: float | None = None) -> np.ndarray:
+        """Nodal gamma (n,) for the history `W_max` (ne, nq) [MPa], from the guess `gamma`; see :meth:`update`."""
+        return self.update(W_max, Density(gamma), tolerance).gamma
+
+    def update(self, W_max: np.ndarray, before: Density, tolerance: float | None = None) -> Density:
+        """The density for the history `W_max` (ne, nq) [MPa]: `before` itself where no sink coefficient has moved.
+
+        Given a `tolerance` of the relative residual, other than the solver's, it looks in the active zones of `before`
+        first.
+
+        Raises
+        ------
+        ConvergenceError
+            The history is not finite, or the lumped solution leaves (0, 1] by more than the solver's tolerance.
+        """
+        if not np.isfinite(W_max.max()):  # infinite, it would make a dead point in silence
+            raise ConvergenceError("the stored energy of a Gauss point is not finite")
+        sink = self.coefficients(W_max)
+        if before.sink is not None and not _changed(sink, before.sink, self.unchanged):
+            self.skipped += 1
+            return before
+        self.solves += 1
+        data = self._assemble(sink)
+        result, zones = None, before.zones
+        if self.sink != "consistent" or sink.max() < 1e3 * sink.min():
+            result, zones = self._iterate(self.pattern.matrix(data), data[self.pattern.diagonal], before, tolerance)
+        if result is None:
+            result = self._factorise(data)
+        if self.sink != "consistent" and not (-self._error < result.min() and result.max() < 1 + self._error):
+            raise ConvergenceError(f"the relative density left (0, 1]: {result.min():.3g} to {result.max():.6g}; the "
+                                   f"mesh has elements so flat that the lumped sink loses its maximum principle")
+        return Density(result, sink, zones)
+
+    def coefficients(self, W_max: np.ndarray) -> np.ndarray:
+        """Sink coefficients 1/(H + eps) of Eq. (9, 10), (ne, nq), each element by its law."""
+        if len(self._parts) == 1:
+            return self.law.coefficients(W_max)
+        sink = np.empty_like(W_max)
+        for elements, law in self._parts:
+            sink[elements] = law.coefficients(W_max[elements])
+        return sink
+
+    def _iterate(self, A: csr_array, D: np.ndarray, before: Density,
+                 tolerance: float | None) -> tuple[np.ndarray | None, tuple[Zone, ...]]:
+        """Solution by AMG-CG, in the active zone where that is enough, None if it did not converge; and the zones."""
+        gamma, zones = before.gamma, before.zones
+        if self.zone is not None and tolerance is not None:
+            gamma, met, iterations, zones = self.zone.solve(A, D, self.load, gamma, tolerance, zones)
+            self.iterations += iterations
+            self._residual = self.zone.residual
+            if met:
+                return gamma, zones
+        result = self._amg.solve(A, D, self.load, gamma, tolerance)
+        self.iterations += self._amg.iterations
+        self._residual = self._amg.residual
+        return result, zones
+
+    def _assemble(self, sink: np.ndarray) -> np.ndarray:
+        if self.sink == "consistent":
+            return self._laplacian + kernels.weighted_mass(self.space, self.pattern, sink)
+        self._data[self.pattern.diagonal] = self._laplacian_diagonal + self._lump(sink)
+        return self._data  # one array for all solves: only the diagonal changes
+
+    def _lump(self, values: np.ndarray) -> np.ndarray:
+        """Nodal sums (n,) of Gauss point values; of sink and load alike, so that H = 1 gives gamma = 1."""
+        if self.sink == "nearest":
+            return np.bincount(self.space.conn.ravel(), (self.space.w * values).ravel(), self.space.n_nodes)
+        return self.space.lump(values)
+
+    def _factorise(self, data: np.ndarray) -> np.ndarray:
+        """Direct solve, on the matrix scaled to a unit diagonal: its entries span fifteen decades."""
+        if self._direct is None:
+            if self.sink != "consistent":
+                log.warning("conjugate gradients on the %s sink did not converge in %d iterations; factorising",
+                            self.sink, self._amg.max_iterations)
+            else:
+                log.warning("the consistent sink varies by more than 1e3 inside an element, where conjugate gradients "
+                            "stall; factorising instead")
+            self._direct = Factorization(Pattern(self.space, upper=True))
+        self.fallbacks += 1
+        upper = self._direct.pattern
+        A = self.pattern.matrix(data)
+        scale = 1.0 / np.sqrt(A.diagonal())
+        rows = np.repeat(np.arange(upper.size), np.diff(upper.indptr))
+        keep = self.pattern.indices >= np.repeat(np.arange(self.pattern.size), np.diff(self.pattern.indptr))
+        self._direct.factorize(data[keep] * scale[rows] * scale[upper.indices])
+        return scale * self._direct.solve(scale * self.load, tolerance=1e-10)
+
+
+@njit(cache=True)
+def _changed(new, old, tolerance):  # type: ignore[no-untyped-def]
+    for e in range(new.shape[0]):
+        for q in range(new.shape[1]):
+            if abs(new[e, q] - old[e, q]) > tolerance * old[e, q]:
+                return True
+    return False

@@ -1,0 +1,202 @@
+"""The momentum balance on one mesh: force, stored energy, tangent and mass for a given relative density."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ..errors import ParameterError
+from ..fem import kernels
+from ..fem.pattern import Pattern
+from ..fem.space import Space
+from ..loads.dead_load import DeadLoad
+from ..material import GeneralMaterial, Material
+from ..material.regions import Region, by_element, rest_of
+
+__all__ = ["ELEMENTS", "Momentum", "Part", "check_element"]
+
+ELEMENTS = ("jbar", "plain", "planestress")
+
+
+def check_element(element: str, space: Space) -> None:
+    """Refuse an element that is not made for the dimension of `space` (ParameterError)."""
+    if element == "planestress" and space.dim == 3:
+        raise ParameterError("element planestress is for meshes of quadrilaterals; this one has hexahedra: take jbar")
+
+
+class Part(NamedTuple):
+    """Elements of one material: their numbers (None: the whole body), and the directions of their fibres, if any."""
+
+    material: Material
+    elements: np.ndarray | None
+    fibres: np.ndarray | None
+
+
+class Momentum:
+    """Internal force and its derivatives (Eq. 14-19, 28) for the relative density last given.
+
+    Memory: the density last given to `set_gamma` and the load time last given to `set_time`: `force`, `tangent`,
+    `stiffest` and the masses are for these. `potential`, `W` and `energy` are of the last `force`.
+
+    Parameters
+    ----------
+    space, material: the spaces and the stored energy, of the elements that are in no region.
+    element: "jbar" for the element-constant J_bar, "plain" for the standard element, "planestress" for a thin sheet of
+        quadrilaterals, whose forces, energies and masses are per mm of undeformed thickness as in plane strain.
+    force_floor: Gauss points with gamma below this exert no force. Their stiffness and mass are then gone together.
+    threads: that share the loops over elements; results do not depend on their number.
+    regions: elements of other materials.
+
+    Attributes
+    ----------
+    parts: the body by its materials.
+    rho0: density of the intact solid [t/mm^3], a number, or where materials differ one for each element (ne, 1).
+    shear_moduli, shear_wave_speeds: least and greatest of the materials [MPa; m/s].
+    energy: gamma-weighted stored energy at the last evaluation [N mm; N mm/mm in 2D].
+    dead: dead loads, if there are any, at the load time last given to :meth:`set_time`; `force` is less them.
+    loads: their potential -f.u at the last evaluation, in the same units.
+    least_J: least J (plane stress: its part in the plane) at a Gauss point with gamma > 0 at the last evaluation.
+    evaluations: how often the force was evaluated.
+    """
+
+    def __init__(self, space: Space, material: Material, element: str = "jbar", force_floor: float = 1e-3,
+                 threads: int = 1, regions: Sequence[Region] = ()) -> None:
+        if element not in ELEMENTS:
+            raise ParameterError(f"element must be one of {', '.join(ELEMENTS)}; got {element!r}")
+        check_element(element, space)
+        self.space, self.material, self.force_floor = space, material, force_floor
+        self.j_bar = element == "jbar"
+        self.plane_stress = element == "planestress"
+        self.parts = self._divide(regions)
+        materials = [part.material for part in self.parts]
+        self._laws = [kernels.Law(m.compiled_law, m.constants, m.bulk_modulus) for m in materials]
+        self.tiles = kernels.Tiles(space, self.plane_stress, threads,
+                                   [(part.elements, part.fibres) for part in self.parts])
+        moduli, speeds = [m.shear_modulus for m in materials], [m.shear_wave_speed for m in materials]
+        self.shear_moduli, self.shear_wave_speeds = (min(moduli), max(moduli)), (min(speeds), max(speeds))
+        rho0 = by_element(space.n_elements, material.rho0, regions, lambda region: region.material.rho0)
+        self.rho0 = rho0[:, None] if isinstance(rho0, np.ndarray) else rho0
+        self.energy = self.loads = 0.0
+        self.dead: DeadLoad | None = None
+        self.least_J = 1.0
+        self.evaluations = 0
+        self._intact = self._lumped(np.ones_like(space.w))
+        self._gamma: np.ndarray | None = np.ones_like(space.w)
+        self.tiles.set_gamma(self._gamma)
+
+    def _divide(self, regions: Sequence[Region]) -> list[Part]:
+        """The body by its materials; without regions it is one part, all elements in their order."""
+        space, parts = self.space, []
+        rest = rest_of(regions, space.n_elements)
+        for material, elements in ((self.material, rest), *((r.material, r.elements) for r in regions)):
+            if not elements.size:
+                continue
+            fibres = None
+            if isinstance(material, GeneralMaterial):
+                if self.plane_stress:
+                    raise ParameterError("element planestress is for laws of I1' alone; "
+                                         f"{type(material).__name__} has more invariants: take jbar")
+                fibres = material.fibres(space.X[space.conn[elements]].mean(axis=1))
+            parts.append(Part(material, elements if elements.size < space.n_elements else None, fibres))
+        return parts
+
+    @property
+    def gamma(self) -> np.ndarray:
+        """Effective relative density at the Gauss points, zero in deleted elements and below the floor, (ne, nq)."""
+        if self._gamma is None:
+            self._gamma = self.tiles.untile(self.tiles.gamma)
+        return self._gamma
+
+    @gamma.setter
+    def gamma(self, gamma: np.ndarray) -> None:
+        """Only for tangents and masses; forces keep what :meth:`set_gamma` gave."""
+        self._gamma = gamma
+
+    def effective(self, gamma: np.ndarray, deleted: np.ndarray) -> np.ndarray:
+        """Relative density the force sees (ne, nq), for nodal values `gamma` (n,) and `deleted` elements (ne,)."""
+        at_gauss = self.space.at_gauss(gamma)
+        at_gauss[(at_gauss < self.force_floor) | deleted[:, None]] = 0.0
+        return at_gauss
+
+    def set_gamma(self, gamma: np.ndarray, deleted: np.ndarray) -> float:
+        """Use the nodal relative density `gamma` (n,) and the `deleted` elements (ne,) from now on.
+
+        Returns the energy [N mm; N mm/mm in 2D] that its fall takes from the stored energy last evaluated.
+        """
+        self._gamma = None
+        if self.dead is not None:
+            nodes, e = self.space.conn[self.dead.elements], self.dead.elements
+            self.dead.keep(((gamma[nodes] @ self.space.N.T >= self.force_floor) & ~deleted[e, None]).any(axis=1))
+        return self.tiles.relax(gamma, deleted, self.force_floor)
+
+    def set_time(self, t: float) -> None:
+        """Use the dead loads of load time `t` [s] from now on."""
+        if self.dead is not None:
+            self.dead.at(t)
+
+    @property
+    def potential(self) -> float:
+        """Stored energy and potential of the dead loads at the last evaluation: `force` is its derivative."""
+        return self.energy + self.loads
+
+    def force(self, u: np.ndarray, out: np.ndarray | None = None) -> np.ndarray:
+        """Internal force at the displacement `u` less the dead loads, (n, dim) [N; N/mm in 2D].
+
+        Sets `energy`, `loads`, `least_J` and `W`.
+        """
+        out = np.empty_like(self.space.X) if out is None else out
+        self.least_J = self.tiles.force(self.space.X + u, self._laws, out, self.j_bar)
+        self.energy = float(self.tiles.psi.sum())
+        if self.dead is not None:
+            out[self.dead.nodes] -= self.dead.values
+            self.loads = self.dead.potential(u)
+        self.evaluations += 1
+        return out
+
+    @property
+    def W(self) -> np.ndarray:
+        """Stored energy density of the undamaged material at the last evaluation [MPa], (ne, nq)."""
+        return self.tiles.untile(self.tiles.W)
+
+    def tangent(self, pattern: Pattern, u: np.ndarray, convex: bool = False) -> np.ndarray:
+        """Data of the tangent stiffness at `u` on `pattern`; with `convex` one that is positive at every point."""
+        data, *others = (self._tangent(part, pattern, u, convex) for part in self.parts)
+        for other in others:
+            data += other
+        return data
+
+    def _tangent(self, part: Part, pattern: Pattern, u: np.ndarray, convex: bool) -> np.ndarray:
+        material, elements, fibres = part
+        if self.plane_stress:
+            return kernels.tangent_plane_stress(self.space, pattern, material, u, self.gamma, convex, elements)
+        if isinstance(material, GeneralMaterial) and fibres is not None:
+            return kernels.tangent_general(self.space, pattern, material, u, self.gamma, fibres, self.j_bar, convex,
+                                           elements)
+        return kernels.tangent(self.space, pattern, material, u, self.gamma, self.j_bar, convex, elements)
+
+    def stiffest(self, u: np.ndarray, inverse_mass: np.ndarray) -> float:
+        """Cheap indicator of the highest frequency squared at `u`, and below it [1/s^2].
+
+        The greatest Rayleigh quotient of what each element resists most: a change of volume, or of area in plane
+        stress. `inverse_mass` (n, dim) is zero where a degree of freedom is held.
+        """
+        x = self.space.X + u
+        if self.plane_stress:
+            return self.tiles.plane_stiffness(x, self._laws, inverse_mass)
+        return self.tiles.volumetric(x, [law.bulk_modulus for law in self._laws], inverse_mass)
+
+    def consistent_mass(self, pattern: Pattern) -> np.ndarray:
+        """Data of the mass matrix of Eq. (28) on `pattern`."""
+        return kernels.mass(self.space, pattern, self.gamma, self.rho0)
+
+    def lumped_mass(self, floor: float) -> np.ndarray:
+        """Row sums (n,) [t; t/mm in 2D] of Eq. (28), at least `floor` times those of the intact solid."""
+        return np.maximum(self._lumped(self.gamma), floor * self._intact)
+
+    def _lumped(self, gamma: np.ndarray) -> np.ndarray:
+        """Row sums (n,) of the mass matrix."""
+        if isinstance(self.rho0, np.ndarray):
+            return self.space.lump(gamma * self.rho0)
+        return self.space.lump(gamma) * self.rho0

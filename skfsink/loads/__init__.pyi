@@ -1,0 +1,5 @@
+from .dead_load import DeadLoad as DeadLoad
+from .grips import Grip as Grip
+from .grips import Ramp as Ramp
+from .grips import Traction as Traction
+from .schedule import Loading as Loading

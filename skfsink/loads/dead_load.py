@@ -1,0 +1,117 @@
+"""Dead tractions on a mesh: nodal forces per undeformed area that keep their direction."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import skfem
+
+from ..errors import MeshError, ParameterError
+from ..fem.space import Space
+from .grips import Ramp, Traction
+
+__all__ = ["DeadLoad"]
+
+
+class DeadLoad:
+    """Nodal forces f_a = int N_a T dA of tractions T, as far as the material they act on is there.
+
+    A traction acts on the facets of the surface all of whose nodes belong to its boundary. The facets of an element
+    that has lost its force, at all its Gauss points, bear no load any more.
+
+    Memory: the load time last given to `at` and the elements last given to `keep`; `at`, `keep`, `resultant`,
+    `potential`, `changed` and `effort` are of the loads as these left them.
+
+    Parameters
+    ----------
+    space: the mesh.
+    tractions: each with the nodes of its boundary.
+
+    Attributes
+    ----------
+    nodes: at which tractions act, (k,).
+    values: their forces at the time last given to :meth:`at`, (k, dim) [N; N/mm in 2D]; replaced, never changed.
+    elements: of the facets, (f,).
+
+    Raises
+    ------
+    MeshError
+        The mesh has no facet on a boundary.
+    ParameterError
+        A traction has not as many components as the mesh.
+    """
+
+    def __init__(self, space: Space, tractions: Sequence[tuple[np.ndarray, Traction]]) -> None:
+        self.space = space
+        self._rates = [tuple(value for value in traction.rate) for _, traction in tractions]
+        boundary, elements, corners, weights, owner = space.mesh.boundary_facets(), [], [], [], []
+        for number, (nodes, traction) in enumerate(tractions):
+            if len(traction.rate) != space.dim:
+                raise ParameterError(f"the traction on {traction.boundary} must have {space.dim} components, as the "
+                                     f"mesh; got {len(traction.rate)}")
+            facets = boundary[np.isin(space.mesh.facets[:, boundary], nodes).all(axis=0)]
+            if not facets.size:
+                raise MeshError(f"no traction can act on boundary {traction.boundary!r}: no facet of the surface has "
+                                f"all its nodes in it; name all nodes of a side")
+            basis = skfem.FacetBasis(space.mesh, space.gamma_basis.elem, facets=facets, intorder=2)
+            elements.append(basis.tind)
+            corners.append(basis.element_dofs.T)
+            weights.append(np.stack([(np.asarray(field[0]) * basis.dx).sum(axis=1) for field in basis.basis], axis=1))
+            owner.append(np.full(facets.size, number))
+        self.elements, weight = np.concatenate(elements), np.concatenate(weights)
+        on_facet = weight > 1e-9 * weight.max(axis=1, keepdims=True)  # other nodes of the element have rounding only
+        self.nodes, corner = np.unique(np.concatenate(corners)[on_facet], return_inverse=True)
+        self._corner, self._weight, self._facet = corner.ravel(), weight[on_facet], np.nonzero(on_facet)[0]
+        self._owner = np.concatenate(owner)
+        self._time, self._alive = 0.0, np.zeros(0, bool)
+        self.keep(np.ones(self.elements.size, bool))
+
+    def keep(self, alive: np.ndarray) -> None:
+        """Let loads act only on the facets whose element is `alive` (f,)."""
+        if np.array_equal(alive, self._alive):
+            return
+        self._alive = alive.copy()
+        k = self.nodes.size
+        place = self._owner[self._facet] * k + self._corner
+        areas = np.bincount(place, self._weight * alive[self._facet], minlength=len(self._rates) * k)
+        self._areas: np.ndarray = areas.reshape(len(self._rates), k)
+        self.at(self._time)
+
+    def at(self, t: float) -> None:
+        """Take the loads of load time `t` [s]."""
+        self._time = t
+        self.values: np.ndarray = self._areas.T @ self.traction(t)
+
+    def traction(self, t: float) -> np.ndarray:
+        """Tractions at load time `t` [s], (tractions, dim) [MPa]."""
+        return np.array([[v.value(t) if isinstance(v, Ramp) else v * t for v in rate] for rate in self._rates])
+
+    def rate(self, t: float) -> float:
+        """Fastest change of a traction from load time `t` [s] on [MPa/s]."""
+        rates = [[v.rate(t) if isinstance(v, Ramp) else v for v in rate] for rate in self._rates]
+        return float(np.linalg.norm(rates, axis=1).max())
+
+    def resultant(self, number: int) -> np.ndarray:
+        """Force of one of the tractions now, (dim,) [N; N/mm in 2D]."""
+        total: np.ndarray = self._areas[number].sum() * self.traction(self._time)[number]
+        return total
+
+    def mean(self, number: int, u: np.ndarray) -> np.ndarray:
+        """Mean of `u` (n, dim) over the boundary of one of the tractions, (dim,), while it is whole."""
+        full = np.bincount(self._corner, self._weight * (self._owner[self._facet] == number), minlength=self.nodes.size)
+        mean: np.ndarray = full @ u[self.nodes] / full.sum()
+        return mean
+
+    # --- energy ---
+    def potential(self, u: np.ndarray) -> float:
+        """-f.u of the loads at the displacement `u` (n, dim) [N mm; N mm/mm in 2D]."""
+        return -float(np.vdot(self.values, u[self.nodes]))
+
+    def changed(self, before: np.ndarray, u: np.ndarray) -> float:
+        """Work -u.df of the change of the loads from `before` (k, dim), at the displacement `u` (n, dim)."""
+        return -float(np.vdot(self.values - before, u[self.nodes]))
+
+    def effort(self, before: np.ndarray, du: np.ndarray) -> float:
+        """Trapezoidal work f.du of loads that were `before` (k, dim) on the way `du` (n, dim)."""
+        return 0.5 * float(np.vdot(self.values + before, du[self.nodes]))

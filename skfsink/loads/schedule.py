@@ -1,0 +1,127 @@
+"""How a body is loaded at each load time: what is held, how fast grips move, and the dead loads."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..errors import ParameterError
+from ..fem.space import Space
+from .dead_load import DeadLoad
+from .grips import Grip, Ramp, Traction
+
+__all__ = ["Loading"]
+
+_AXES = "xyz"
+
+
+class Loading:
+    """Grips and tractions on a mesh.
+
+    Between two *knots*, the times at which a ramp has a point, grips move at constant velocity and tractions change
+    at a constant rate.
+
+    Parameters
+    ----------
+    space: the mesh.
+    grips, tractions: each with the nodes of its boundary.
+
+    Attributes
+    ----------
+    free: (n*dim,) mask of the degrees of freedom that no grip holds.
+    knots: ascending, all > 0 [s].
+    dead: the tractions, None if there are none.
+
+    Raises
+    ------
+    ParameterError
+        A grip or traction has not as many components as the mesh, two grips move a node differently, or a body under
+        tractions can move as a whole.
+    MeshError
+        The mesh has no facet a traction could act on.
+    """
+
+    def __init__(self, space: Space, grips: Sequence[tuple[np.ndarray, Grip]],
+                 tractions: Sequence[tuple[np.ndarray, Traction]] = ()) -> None:
+        self._moves: list[tuple[np.ndarray, int, float | Ramp]] = []
+        free = np.ones(space.X.shape, bool)
+        holders = np.full(space.X.shape, -1)  # number of the grip that holds a component of a node
+        for number, (nodes, grip) in enumerate(grips):
+            if len(grip.velocity) != space.dim:
+                raise ParameterError(f"grip {grip.boundary} must have {space.dim} components, as the mesh; got "
+                                     f"{len(grip.velocity)}")
+            for i, value in enumerate(grip.velocity):
+                if value is not None:
+                    for other in np.setdiff1d(holders[nodes, i], -1):
+                        if (there := grips[other][1]).velocity[i] != value:
+                            at = space.X[nodes[holders[nodes, i] == other][0]]
+                            raise ParameterError(
+                                f"grips {there.boundary} and {grip.boundary} both hold {_AXES[i]} of the node at "
+                                f"({', '.join(f'{x:.3g}' for x in at)}) and move it differently: leave {_AXES[i]} out "
+                                f"of one of them, or end one of the boundaries short of the other")
+                    holders[nodes, i] = number
+                    free[nodes, i] = False
+                    self._moves.append((nodes, i, value))
+        self.free = free.ravel()
+        values = [value for *_, value in self._moves] + [v for _, traction in tractions for v in traction.rate]
+        ramps = [value for value in values if isinstance(value, Ramp)]
+        self.knots: tuple[float, ...] = tuple(sorted({float(t) for ramp in ramps for t in ramp.times if t > 0}))
+        self.dead = DeadLoad(space, tractions) if tractions else None
+        self._shape = space.X.shape
+        self._steady: np.ndarray | None = None
+        if not any(isinstance(value, Ramp) for *_, value in self._moves):
+            self._steady = self.velocity(0.0)
+        if tractions:
+            _check_held(space, free)
+
+    @classmethod
+    def of(cls, space: Space, free: np.ndarray, motion: np.ndarray | Loading) -> Loading:
+        """`motion` itself, or grips that hold all but `free` (n*dim,) and move at the velocity `motion` (n, dim)."""
+        if isinstance(motion, Loading):
+            return motion
+        steady = cls(space, ())
+        steady.free, steady._steady = free, motion
+        return steady
+
+    def knot(self, t: float) -> float:
+        """The next knot after load time `t`, infinity if there is none [s]."""
+        i = bisect_right(self.knots, t)
+        return self.knots[i] if i < len(self.knots) else np.inf
+
+    def velocity(self, t: float) -> np.ndarray:
+        """Velocity of what is held, from load time `t` up to the next knot, (n, dim) [mm/s]; zero elsewhere."""
+        if self._steady is not None:
+            return self._steady
+        velocity = np.zeros(self._shape)
+        for nodes, i, value in self._moves:
+            velocity[nodes, i] = value.rate(t) if isinstance(value, Ramp) else value
+        return velocity
+
+    def speed(self, t: float) -> float:
+        """Greatest component of that velocity [mm/s]."""
+        return float(np.abs(self.velocity(t)).max())
+
+    def pull(self, t: float) -> float:
+        """Fastest change of a traction from load time `t` on [MPa/s]."""
+        return self.dead.rate(t) if self.dead is not None else 0.0
+
+
+def _check_held(space: Space, free: np.ndarray) -> None:
+    """Refuse a body that can be moved, or turned, without a force: under dead loads it would be."""
+    for i in range(space.dim):
+        if free[:, i].all():
+            raise ParameterError(f"no grip holds the body in {_AXES[i]}, and a traction would carry it away: hold a "
+                                 f"boundary in that direction")
+    x = (space.X - space.X.mean(axis=0)) / np.ptp(space.X, axis=0).max()
+    modes = [np.broadcast_to(row, x.shape) for row in np.eye(space.dim)]
+    for i in range(space.dim):
+        for j in range(i):
+            turn = np.zeros_like(x)
+            turn[:, i], turn[:, j] = x[:, j], -x[:, i]
+            modes.append(turn)
+    grasp = np.array([mode[~free] for mode in modes])
+    if np.linalg.eigvalsh(grasp @ grasp.T)[0] < 1e-9:
+        raise ParameterError("the grips let the body turn, and a traction would turn it: hold a boundary at two "
+                             "places, or in one more direction")

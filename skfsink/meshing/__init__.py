@@ -1,0 +1,5 @@
+"""Everything before a body: outlines and their meshes, mesh files, samples."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,17 @@
+from .outline import Edge as Edge
+from .outline import SizeField as SizeField
+from .outline import completed as completed
+from .outline import has_gmsh as has_gmsh
+from .outline import mesh_outline as mesh_outline
+from .sample import Sample as Sample
+from .sample import file_sample as file_sample
+from .sample import load_sample as load_sample
+from .sample import mesh_sample as mesh_sample
+from .sample import shape_sample as shape_sample
+from .sweeping import rolled as rolled
+from .sweeping import swept as swept
+from .sweeping import unrolled as unrolled
+from .symmetry import Mirror as Mirror
+from .symmetry import Whole as Whole
+from .vtu import read_mesh as read_mesh
+from .vtu import write_mesh as write_mesh

@@ -1,0 +1,9 @@
+from .controls import ExplicitControls as ExplicitControls
+from .controls import HHTControls as HHTControls
+from .controls import StaticsControls as StaticsControls
+from .explicit import Explicit as Explicit
+from .hht import HHT as HHT
+from .newton import Newton as Newton
+from .onset import StaticLoading as StaticLoading
+from .rest import LoadingFromRest as LoadingFromRest
+from .statics import Statics as Statics

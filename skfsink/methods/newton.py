@@ -1,0 +1,194 @@
+"""Equilibrium at fixed gamma: Newton's method with an energy line search that finds one however far away it is.
+
+Factorisations are dear and kept: they first serve as they are (modified Newton), then as preconditioner of conjugate
+gradients on the current tangent, until either is slow. Where the tangent is indefinite, as when a piece comes loose
+and turns, the step is taken with a convex one: the pressure in its geometric part is bounded where it would make a
+Gauss point unstable (see :mod:`.kernels.tangent`). That is a second derivative of the potential wherever the body is
+stable, so that the last steps are Newton's.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import ConvergenceError
+from ..fem.direct import Factorization
+from ..fem.pattern import Pattern
+from ..fields.momentum import Momentum
+
+__all__ = ["Newton"]
+
+
+class Newton:
+    """Finds displacements in equilibrium between grips, at the density and dead loads last given to `momentum`.
+
+    Memory: factors of a tangent, which later calls use as long as they serve: of which equilibrium within `tolerance`
+    is found, in how many steps, depends on earlier calls to `equilibrium` and `predict`, whether their increments were
+    taken or given up. `memory` gives what they were made from.
+
+    Parameters
+    ----------
+    momentum: forces and tangents.
+    free: (n*dim,) mask of the degrees of freedom that no grip holds.
+    tolerance: residual force at which equilibrium is reached, relative to the forces inside and the dead loads.
+    most: Newton steps after which an equilibrium is given up, unless a call says more.
+    threads: of the factorisations.
+
+    Attributes
+    ----------
+    steps: Newton steps made.   iterations: conjugate-gradient iterations.   solver: the factorisation, with its count.
+    """
+
+    LIVE = 1e-3     # nodes with less than this of their mass are not asked for equilibrium
+    KEEP = 0.2      # factors are used as they are while each step with them lowers the residual to this fraction
+    FAR = 0.5       # far from equilibrium: a step leaves more than this of the residual, or had to be shortened
+    INEXACT = 0.02  # relative residual of a step by conjugate gradients
+    MOST = (5, 12)  # their iterations, in two and in three dimensions
+    WORTH = (10, 24)  # iterations that take as long as a factorisation, on a body of 50,000 elements
+    LEAST_J = 0.05  # of a Gauss point that still carries force; below, a trial is refused
+    SHORTEST = 1e-6  # step length at which a direction is given up
+
+    def __init__(self, momentum: Momentum, free: np.ndarray, tolerance: float, most: int, threads: int = 1) -> None:
+        self.momentum, self.free, self.tolerance, self.most = momentum, free, tolerance, most
+        self.space = momentum.space
+        self.pattern = Pattern(self.space, self.space.dim, free, upper=True)
+        self.solver = Factorization(self.pattern, threads=threads)
+        self.steps = self.iterations = 0
+        self._volume = self.space.lump(np.ones_like(self.space.w))
+        # a body that has come apart bears no force; this says what counts as none, in the softest material too
+        size = float(self.space.V.sum()) ** (1 - 1 / self.space.dim)
+        self._least_force = 1e-3 * momentum.shear_moduli[0] * size
+        # rounding of the stored energy, most in the stiffest one: I1' - 3 is a difference of numbers of order one
+        self._noise = 1e-14 * momentum.shear_moduli[1] * float(self.space.V.sum())
+        self._kept: tuple[np.ndarray, np.ndarray] | None = None  # displacement and gamma the factors were made at
+        self._slow = False  # whether the factors have become too old to be used as they are
+        self._spent = 0     # iterations and assemblies since they were made
+
+    def equilibrium(self, u: np.ndarray, tolerance: float | None = None,
+                    most: int | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Displacement in equilibrium at the current gamma, from the guess `u` with the grips in place, and its force.
+
+        Raises
+        ------
+        ConvergenceError
+            No equilibrium within `most` steps, or no step that lowers the energy.
+        """
+        tolerance, most = tolerance or self.tolerance, most or self.most
+        momentum, live = self.momentum, self._live()
+        u = u.copy()
+        force = momentum.force(u)
+        energy = momentum.potential
+        lowest = min(self.LEAST_J, momentum.least_J)
+        last, length, modified = np.inf, 1.0, False
+        pulled = 0.0 if momentum.dead is None else float(np.linalg.norm(momentum.dead.values))
+        for _ in range(most):
+            r = force.ravel()[self.free]
+            error = float(np.linalg.norm(r[live]) / (np.linalg.norm(force) + self._least_force + pulled))
+            if error <= tolerance:
+                return u, force
+            self.steps += 1
+            self._slow = self._slow or (modified and error > self.KEEP * last)
+            if length < 1.0 or error > self.FAR * last:
+                self._kept = None
+            last = error
+            modified = self._kept is not None and not self._slow
+            step, fresh = np.zeros(u.shape), False
+            while True:
+                if modified:
+                    d = self.solver.apply(-r)
+                else:
+                    d, fresh = self._direction(u, r)
+                step.reshape(-1)[self.free] = d
+                length, force = self._search(u, step, float(r @ d), energy, lowest)
+                if length > 0.0:
+                    break
+                if fresh:
+                    raise ConvergenceError("no equilibrium: the energy falls in no direction Newton's method offers")
+                self._slow = True
+                if not modified:
+                    self._kept = None
+                modified = False
+            u += length * step
+            energy = momentum.potential
+        raise ConvergenceError(f"no equilibrium within {most} Newton steps")
+
+    def predict(self, u: np.ndarray, move: np.ndarray) -> np.ndarray:
+        """`u` after the grips have moved by `move` (n, dim; zero at free nodes), to first order in it."""
+        eps = 1e-6 * float(self.space.h.min()) / (np.abs(move).max() + 1e-300)
+        pull = (self.momentum.force(u + eps * move) - self.momentum.force(u - eps * move)) / (2 * eps)
+        d = np.zeros(u.size)
+        d[self.free], _ = self._direction(u, (self.momentum.force(u) + pull).ravel()[self.free], 1e-3)
+        return u + move + d.reshape(u.shape)
+
+    def release(self) -> None:
+        """Free the memory of the factors; they are made again when they are needed."""
+        self.solver.release()
+        self._kept = None
+
+    # --- directions ---
+    def _live(self) -> np.ndarray:
+        live: np.ndarray = self.space.lump(self.momentum.gamma) > self.LIVE * self._volume
+        return np.repeat(live, self.space.dim)[self.free]
+
+    def _direction(self, u: np.ndarray, r: np.ndarray, tolerance: float = INEXACT) -> tuple[np.ndarray, bool]:
+        """A step that lowers the residual force `r` at `u`, and whether the factors behind it are those of `u`."""
+        data = self.momentum.tangent(self.pattern, u)
+        if self._kept is not None and self._spent < self.WORTH[self.space.dim - 2]:
+            most = self.MOST[self.space.dim - 2]
+            d, iterations, met = self.solver.conjugate(data, -r, tolerance, most)
+            self.iterations += iterations
+            self._spent += iterations + 2  # an assembly takes as long as two
+            if not met:
+                self._kept = None  # new ones, at the next step if this one is of use
+            if met or iterations > most // 2:
+                return d, False
+        self._factorise(u, data)
+        return self.solver.apply(-r), True
+
+    def _factorise(self, u: np.ndarray, data: np.ndarray) -> None:
+        """Factors of the tangent at `u`, or of a positive definite matrix like it."""
+        self._kept, self._slow, self._spent = (u.copy(), self.momentum.gamma.copy()), False, 0
+        if self.solver.factorize(data, indefinite=False):
+            return
+        data = self.momentum.tangent(self.pattern, u, convex=True)
+        diagonal = np.abs(data[self.pattern.diagonal])
+        shift = 1e-4
+        while not self.solver.factorize(data, indefinite=False):  # not seen: the convex tangent is definite
+            data[self.pattern.diagonal] += shift * diagonal
+            shift *= 4
+            if not shift < 1e8:
+                raise ConvergenceError("no equilibrium: the tangent is not finite")
+
+    def _search(self, u: np.ndarray, step: np.ndarray, slope: float, energy: float,
+                lowest: float) -> tuple[float, np.ndarray]:
+        """Length, halved from 1, with which `step` lowers the potential and inverts no Gauss point, and force there.
+
+        The length is 0 if there is none.
+        """
+        momentum, length, force = self.momentum, 1.0, np.empty_like(u)
+        while slope < 0.0 and length >= self.SHORTEST:
+            momentum.force(u + length * step, force)
+            fits = momentum.least_J >= lowest and np.isfinite(momentum.energy)
+            if fits and momentum.potential <= energy + 1e-4 * length * slope + self._noise:
+                return length, force
+            length *= 0.5
+        return 0.0, force
+
+    # --- checkpoints ---
+    def memory(self) -> dict[str, np.ndarray]:
+        """What the factors were made from, for a checkpoint."""
+        if self._kept is None:
+            return {}
+        return {"kept_u": self._kept[0], "kept_gamma": self._kept[1], "slow": np.array(self._slow),
+                "spent": np.array(self._spent)}
+
+    def restore(self, memory: dict[str, np.ndarray]) -> None:
+        """Make the factors again; the density of `momentum` is left as it is."""
+        self._kept = None
+        if "kept_u" not in memory:
+            return
+        momentum, gamma = self.momentum, self.momentum.gamma
+        momentum.gamma = memory["kept_gamma"]
+        self._factorise(memory["kept_u"], momentum.tangent(self.pattern, memory["kept_u"]))
+        momentum.gamma = gamma
+        self._slow, self._spent = bool(memory["slow"]), int(memory["spent"])

@@ -1,0 +1,77 @@
+"""Loading from rest: the unloaded body is set in motion by its grips, and its dynamics followed to the onset.
+
+Waves cross the body thousands of times while slow grips load it, so that the explicit scheme would take 10^9 steps. The
+implicit one takes steps as long as the two fields converge in them, and those that do not are halved: first with the
+distance to the limit load, then with the growth of the instability. When the body moves much faster than its grips, the
+event begins: state, velocities and accelerations are handed over.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from ..errors import ParameterError
+from ..fields.crack import CRACKED
+from ..fields.density import DensitySolver
+from ..fields.momentum import Momentum
+from ..fields.state import State
+from ..loads.schedule import Loading
+from .controls import HHTControls
+from .hht import HHT
+
+__all__ = ["LoadingFromRest"]
+
+
+class LoadingFromRest:
+    """Brings a state from rest to the onset by the implicit scheme.
+
+    Parameters
+    ----------
+    momentum, density: the two fields.
+    free: (n*dim,) mask of the degrees of freedom that no grip holds.
+    motion: of the held ones, as a :class:`.Loading` without ramps, or as their velocity (n, dim) [mm/s].
+    controls: options of the event; damping and mass are taken from it.
+    deletion: gamma at which an element fails.
+
+    Attributes
+    ----------
+    integrator: the implicit scheme, whose memory belongs into a checkpoint.
+    """
+
+    INCREMENT = 0.002    # largest step, as displacement of a grip over the size of the body
+    TOLERANCE = 1e-4     # of forces and of gamma: what is left is the kick the event begins with
+    ITERATIONS = 200     # the coupling of the fields converges ever more slowly towards the limit load
+    FAST = 100.0         # speed at which the event begins, in speeds of a grip; a body under load has a few
+
+    def __init__(self, momentum: Momentum, density: DensitySolver, free: np.ndarray, motion: np.ndarray | Loading,
+                 controls: HHTControls, deletion: float = 1e-6, threads: int = 1) -> None:
+        size = float(np.ptp(momentum.space.X, axis=0).max())
+        speed = Loading.of(momentum.space, free, motion).speed(0.0)
+        if not speed > 0.0:
+            raise ParameterError("start rest needs a grip that moves from the beginning on; all of them are still: "
+                                 "give one a velocity, or take start onset")
+        self._fast = self.FAST * speed
+        longest = max(self.INCREMENT * size / speed, 2 * controls.dt)
+        self._last = controls.dt
+        self.integrator = HHT(momentum, density, free, motion, replace(
+            controls, coupling="iterated", dt=longest, dt_first=0.0, force_tolerance=self.TOLERANCE,
+            correction_tolerance=2 * self.TOLERANCE, gamma_tolerance=self.TOLERANCE, max_iterations=self.ITERATIONS),
+            deletion, threads)
+        self.integrator.loading = True
+
+    @property
+    def increment(self) -> float:
+        """The next step [s]."""
+        return self.integrator.dt
+
+    def load(self, state: State) -> Iterator[State]:
+        """Load `state` to the onset, yielding it after each step; the last one is the onset."""
+        if state.step == 0:
+            self.integrator.begin(state)
+        while (self.integrator.dt > self._last and float(np.abs(state.v).max()) < self._fast
+               and state.gamma.min() >= CRACKED):  # under fast grips the body cracks before it is faster than they are
+            self.integrator.step(state)
+            yield state

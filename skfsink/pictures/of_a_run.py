@@ -1,0 +1,89 @@
+"""The pictures of a run, drawn from the files it has left."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from ..results.frame import Frame, frame_file, read_frame
+from ..results.history import History
+from ..results.result import Result
+from ..results.series import frame_times
+from ..scene.scene import Scene
+from .plot import (
+    animation,
+    comparison_picture,
+    density_picture,
+    ledger_picture,
+    loading_picture,
+    speed_picture,
+    tip_picture,
+)
+
+__all__ = ["draw_comparison", "draw_run"]
+
+_WORDS = {"onset": "onset", "branching": "first branches", "arrival": "first arrival", "end": "end"}
+
+
+def draw_run(scene: Scene, folder: Path, series: str, moments: Mapping[str, int]) -> None:
+    """`density.png`, `speed.png` (dynamic), `energies.png`, `tip.png` and `animation.gif` of a finished run.
+
+    They are drawn from the files in `folder`. `series` names the one to draw, "run", or "loading" of a body that did
+    not fail; `moments` has the numbers of the frames at key moments.
+    """
+    space = scene.sample.space
+    quasistatic = scene.controls.analysis == "quasistatic"
+    kind = "quasi-static" if quasistatic else f"dynamic, {scene.controls.integrator}"
+    title = f"{scene.title}, mesh {scene.sample.name}, {kind}"
+    history = History.load(folder / "history.csv")
+    if series == "loading":
+        _draw_loading(scene, folder)
+        return
+    labels = {number: _WORDS.get(label, label) for label, number in moments.items()}
+    frames = [_frame(folder, number, time, labels.get(number, ""), scene)
+              for number, time in enumerate(frame_times(folder / "series" / "run.pvd"))]
+    keys = sorted(set(moments.values()))
+    if len(keys) < 4:  # too few things happened: add the middle of the event
+        keys = sorted({*keys, len(frames) // 2})
+    density_picture(space, [frames[k] for k in keys], folder / "density.png", title, scene.view)
+    if not quasistatic:
+        speed_picture(space, [frames[k] for k in keys], folder / "speed.png", title, scene.view)
+    ledger_picture(history, folder / "energies.png", title)
+    part = max(scene.parts, key=lambda part: int(frames[-1].deleted[part.elements].sum()))  # where the crack has run
+    if len(scene.parts) > 1 and not quasistatic:
+        title += f"\n$c_s$, $c_R$ {'in region ' + part.name if part.name else 'outside of the regions'}"
+    tip_picture(history, folder / "tip.png", title, np.nan if quasistatic else part.material.shear_wave_speed,
+                np.nan if quasistatic else part.material.rayleigh_wave_speed)
+    animation(space, frames, folder / "animation.gif", view=scene.view)
+
+
+def _draw_loading(scene: Scene, folder: Path) -> None:
+    """`density.png`, `loading.png` and `animation.gif` of a run that did not fail."""
+    space, title = scene.sample.space, f"{scene.title}, mesh {scene.sample.name}: nothing failed"
+    frames = [read_frame(folder / "series" / frame_file("loading", i), np.nan, f"load time {time:.4g} s", space.dim)
+              for i, time in enumerate(frame_times(folder / "series" / "loading.pvd"))]
+    keys = sorted({len(frames) // 2, len(frames) - 1})
+    density_picture(space, [frames[k] for k in keys], folder / "density.png", title, scene.view)
+    loading_picture(History.load(folder / "history.csv"), folder / "loading.png", title)
+    animation(space, frames, folder / "animation.gif", view=scene.view)
+
+
+def _frame(folder: Path, number: int, time: float, word: str, scene: Scene) -> Frame:
+    quasistatic = scene.controls.analysis == "quasistatic"
+    if quasistatic:
+        word = ", ".join(filter(None, [word, f"sweep {time:.0f}"]))
+    return read_frame(folder / "series" / frame_file("run", number), np.nan if quasistatic else time, word,
+                      scene.sample.space.dim)
+
+
+def draw_comparison(dynamic: Result, quasistatic: Result, folder: Path) -> None:
+    """`comparison.png`: the dynamic crack beside the quasi-static one, at the end of each."""
+    frames = []
+    space = dynamic.scene.sample.space
+    for part in (dynamic, quasistatic):
+        number = part.summary["moments"].get("arrival", part.summary["moments"]["end"])
+        frames.append(read_frame(part.folder / "series" / frame_file("run", number), np.nan, "", space.dim))
+    comparison_picture(space, frames[0], frames[1], dynamic.history, quasistatic.history, folder / "comparison.png",
+                       f"{dynamic.scene.title}, mesh {dynamic.scene.sample.name}", dynamic.scene.view)

@@ -1,0 +1,11 @@
+from .frame import Frame as Frame
+from .frame import read_frame as read_frame
+from .history import HISTORY_COLUMNS as HISTORY_COLUMNS
+from .history import History as History
+from .history import Table as Table
+from .loader import Run as Run
+from .loader import load as load
+from .result import Result as Result
+from .series import Series as Series
+from .summary import read_summary as read_summary
+from .summary import write_summary as write_summary

@@ -1,0 +1,150 @@
+"""Files of a run: the history table, the series of fields for ParaView, and the summary.
+
+Every file is replaced as a whole, or grows by whole lines, so that it can be read at any moment of the run and after
+a run was killed. Nothing written depends on the clock: two equal runs give equal files.
+"""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from collections.abc import Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
+
+import meshio
+import numpy as np
+
+from ..errors import OutputError
+from ..fem.space import Space
+from ..system.files import prepare_folder, replaced, write_atomic
+from .frame import frame_file
+from .history import HISTORY_COLUMNS, History
+
+__all__ = ["HISTORY_COLUMNS", "History", "Series", "frame_times", "prepare_folder", "replaced",
+           "write_atomic"]
+
+VTK_ORDER = {2: [0, 1, 3, 2], 3: [0, 1, 3, 2, 4, 5, 7, 6]}  # corners of `Space.conn` in the order of VTK
+
+
+# --- the fields ---
+class Series:
+    """A time series of fields for ParaView: `<name>.pvd`, which names the frames `<name>_0000.vtu`, ...
+
+    Points are those of the undeformed body: warp by the vector `displacement` to see it deformed.
+
+    Memory: the frames so far; `add` writes the next one, `flush` and `close` wait for the last one, `resume` takes up
+    those in the folder.
+
+    Parameters
+    ----------
+    folder: an existing folder.
+    name: of the series.
+    space: whose mesh the fields live on.
+    """
+
+    def __init__(self, folder: str | Path, name: str, space: Space) -> None:
+        self.folder, self.name, self.space = Path(folder), name, space
+        self.times: list[float] = []
+        self._writer = ThreadPoolExecutor(1, "frames")  # compressing a frame takes as long as twenty steps
+        self._pending: Future[None] | None = None
+        self._points = _vectors(space.X)
+        self._cells = [("quad" if space.dim == 2 else "hexahedron", space.conn[:, VTK_ORDER[space.dim]].astype("i4"))]
+
+    @property
+    def path(self) -> Path:
+        """The PVD file, which ParaView opens."""
+        return self.folder / f"{self.name}.pvd"
+
+    def frame(self, number: int) -> Path:
+        """The VTU file of a frame."""
+        return self.folder / frame_file(self.name, number)
+
+    def add(self, time: float, point_data: Mapping[str, np.ndarray], cell_data: Mapping[str, np.ndarray]) -> None:
+        """Write a frame, then name it in the PVD file, while the caller goes on; see :meth:`flush`.
+
+        Arrays are (n,) or (n, dim) on points, (ne,) or (ne, dim) on cells. Vectors get a third component; floats are
+        stored in single precision, flags as bytes.
+        """
+        self.flush()
+        points = {name: _field(values) for name, values in point_data.items()}
+        cells = {name: [_field(values)] for name, values in cell_data.items()}
+        mesh = meshio.Mesh(self._points, self._cells, points, cells)
+        self.times.append(float(time))
+        self._pending = self._writer.submit(self._write, self.frame(len(self.times) - 1), mesh)
+
+    def flush(self) -> None:
+        """Wait until every frame is written.
+
+        Raises
+        ------
+        OutputError
+            One could not be written.
+        """
+        if self._pending is not None:
+            pending, self._pending = self._pending, None
+            pending.result()
+
+    def close(self) -> None:
+        """Wait for the frame that is being written, if any, whatever becomes of it: the run has ended otherwise."""
+        if self._pending is not None:
+            self._pending.exception()
+            self._pending = None
+
+    def _write(self, path: Path, mesh: meshio.Mesh) -> None:
+        with replaced(path) as part:
+            meshio.write(part, mesh, "vtu", compression="zlib")
+        self._write_index()
+
+    def resume(self, n: int) -> None:
+        """Take up the series found in the folder after its first `n` frames; drop the later ones.
+
+        Raises
+        ------
+        OutputError
+            There is no such series, or it has fewer frames.
+        """
+        self.flush()
+        failure = f"cannot resume the series of fields: {self.path}"
+        try:
+            times = [float(entry.attrib["timestep"]) for entry in ET.parse(self.path).iter("DataSet")] if n else []
+        except (OSError, ET.ParseError, KeyError, ValueError):
+            raise OutputError(f"{failure} is missing or damaged") from None
+        if (there := sum(self.frame(i).is_file() for i in range(min(n, len(times))))) < n:
+            raise OutputError(f"{failure} has {there} of the {n} frames")
+        self.times = times[:n]
+        self._write_index()
+        while self.frame(n).is_file():
+            self.frame(n).unlink()
+            n += 1
+
+    def _write_index(self) -> None:
+        root = ET.Element("VTKFile", type="Collection", version="0.1", byte_order="LittleEndian")
+        collection = ET.SubElement(root, "Collection")
+        for i, time in enumerate(self.times):
+            ET.SubElement(collection, "DataSet", timestep=repr(time), group="", part="0", file=self.frame(i).name)
+        ET.indent(root, " ")
+        write_atomic(self.path, '<?xml version="1.0"?>\n' + ET.tostring(root, "unicode") + "\n")
+
+
+def frame_times(path: Path) -> list[float]:
+    """Times of the frames that a PVD file names [s], or sweeps; OutputError if it is not there, or damaged."""
+    try:
+        return [float(entry.attrib["timestep"]) for entry in ET.parse(path).iter("DataSet")]
+    except (OSError, ET.ParseError, KeyError, ValueError):
+        raise OutputError(f"{path} is missing or damaged") from None
+
+
+def _field(values: np.ndarray) -> np.ndarray:
+    """A copy as it is stored."""
+    if values.dtype == bool:
+        values = values.astype(np.uint8)
+    elif values.dtype.kind == "f":
+        limit = np.finfo(np.float32).max
+        values = np.clip(values, -limit, limit).astype(np.float32)
+    else:
+        values = values.copy()
+    return _vectors(values) if values.ndim == 2 and values.shape[1] == 2 else values
+
+
+def _vectors(values: np.ndarray) -> np.ndarray:
+    return np.column_stack([values, np.zeros((len(values), 3 - values.shape[1]), values.dtype)])

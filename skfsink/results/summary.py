@@ -1,0 +1,62 @@
+"""The summary of a run: `summary.json`."""
+
+from __future__ import annotations
+
+import json
+import math
+import platform
+from collections.abc import Mapping
+from contextlib import suppress
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .._version import __version__
+from ..errors import OutputError
+from ..system.files import write_atomic
+
+__all__ = ["SUMMARY", "read_summary", "versions", "write_summary"]
+
+SUMMARY = "summary.json"
+
+
+def write_summary(path: str | Path, summary: Mapping[str, Any]) -> None:
+    """Write the results of a run as JSON, arrays as lists. An OutputError names a number that is not finite."""
+    write_atomic(path, json.dumps(_plain(summary, "summary"), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def read_summary(folder: Path, name: str = SUMMARY) -> dict[str, Any]:
+    """The summary of a finished run; OutputError if there is none, or it is damaged."""
+    path = folder / name
+    try:
+        summary = json.loads(path.read_text(encoding="utf-8"))
+        if not isinstance(summary, dict) or "case" not in summary:
+            raise ValueError("no summary")
+        return summary
+    except FileNotFoundError:
+        raise OutputError(f"{path.parent} holds no finished run: there is no {path.name}") from None
+    except (OSError, ValueError) as error:
+        raise OutputError(f"{path} is damaged: {error}") from None
+
+
+def _plain(value: Any, name: str) -> Any:
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item, f"{name}.{key}") for key, item in value.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        return _plain(value.tolist(), name)
+    if isinstance(value, list | tuple):
+        return [_plain(item, f"{name}[{i}]") for i, item in enumerate(value)]
+    if isinstance(value, float) and not math.isfinite(value):
+        raise OutputError(f"{name} is {value}: a summary holds finite numbers only")
+    return str(value) if isinstance(value, Path) else value
+
+
+def versions() -> dict[str, str]:
+    """Versions of what the results came from, and the machine."""
+    found = {"skfsink": __version__, "python": platform.python_version()}
+    for package in ("numpy", "scipy", "scikit-fem", "numba", "pyamg", "meshio", "pypardiso"):
+        with suppress(PackageNotFoundError):
+            found[package] = version(package)
+    return {**found, "machine": f"{platform.system()} {platform.machine()}"}

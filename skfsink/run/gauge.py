@@ -1,0 +1,80 @@
+"""What a run reports as its load and its displacement."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..fields.state import State
+from ..loads.grips import Ramp
+from ..loads.schedule import Loading
+from ..scene.scene import Scene
+
+__all__ = ["Gauge"]
+
+
+class Gauge:
+    """Load and displacement of a scene.
+
+    The load is the force on the first grip that ever moves, along its motion; of one that follows ramps that is its
+    motion in the last stretch of time in which it moves, or away from where it began if it moves back then. The
+    displacement is that of this grip relative to the last other one, in the same direction. Without a grip that moves
+    they are those of the first traction: its force, and the mean displacement of its boundary relative to that of the
+    last other traction, or to the grips.
+    """
+
+    def __init__(self, scene: Scene, loading: Loading) -> None:
+        self.scene, self.loading = scene, loading
+        self._grip = scene.moving
+        if self._grip is None:
+            self._direction = _unit(_last(scene.tractions[0].rate)) if scene.tractions else np.zeros(0)
+            return
+        self._nodes = scene.sample.nodes(self._grip.boundary)
+        self._direction = _unit(_last(self._grip.velocity))
+        other = scene.opposite
+        self._others = None if other is None else scene.sample.nodes(other.boundary)
+        self._clock = not any(isinstance(v, Ramp) for grip in (self._grip, other) if grip for v in grip.velocity)
+
+    def load(self, reaction: np.ndarray) -> float:
+        """The load for the `reaction` (n, dim), the force of the body less the dead loads [N; N/mm in 2D]."""
+        if self._grip is not None:
+            return float((reaction[self._nodes] @ self._direction).sum())
+        dead = self.loading.dead
+        return 0.0 if dead is None else float(dead.resultant(0) @ self._direction)
+
+    def displacement(self, state: State) -> float:
+        """The displacement [mm]."""
+        if self._grip is None:
+            return self._of_traction(state.u)
+        if self._clock:
+            return state.grip * self.scene.speed
+        u = state.u[self._nodes].mean(axis=0)
+        return float((u if self._others is None else u - state.u[self._others].mean(axis=0)) @ self._direction)
+
+    def _of_traction(self, u: np.ndarray) -> float:
+        dead, tractions = self.loading.dead, self.scene.tractions
+        if dead is None:
+            return 0.0
+        moved = dead.mean(0, u)
+        if tractions[-1].boundary != tractions[0].boundary:
+            moved = moved - dead.mean(len(tractions) - 1, u)
+        return float(moved @ self._direction)
+
+
+def _last(values: Sequence[float | Ramp | None]) -> np.ndarray:
+    """Rates of the components in the last stretch of time in which one of them changes."""
+    ramps = [v for v in values if isinstance(v, Ramp)]
+    times = sorted({0.0, *(t for v in values if isinstance(v, Ramp) for t in v.times)}, reverse=True)
+    for t in times:
+        rates = np.array([v.rate(t) if isinstance(v, Ramp) else v or 0.0 for v in values])
+        if rates.any():
+            end = min((knot for ramp in ramps for knot in ramp.times if knot > t), default=t)
+            middle = np.array([v.value(0.5 * (t + end)) if isinstance(v, Ramp) else 0.0 for v in values])
+            return -rates if float(middle @ rates) < 0.0 else rates
+    return np.zeros(len(values))
+
+
+def _unit(vector: np.ndarray) -> np.ndarray:
+    unit: np.ndarray = vector / (np.linalg.norm(vector) or 1.0)
+    return unit

@@ -1,0 +1,305 @@
+"""Guards of a run: where a method leaves its range the run says so, or stops, with the cure.
+
+A *warning* says that results depend on something they should not depend on; the run goes on, and `summary.json` lists
+it. An *error* stops a run whose state can no longer be trusted. Thresholds stand here, as class attributes; what they
+are based on is in `docs/stability.md`.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+
+import numpy as np
+
+from ..errors import InstabilityError, SkfsinkError, place_text
+from ..fem import indicators
+from ..fields.momentum import Momentum
+from ..fields.state import State
+from ..material.regions import Region, by_element
+from ..scene.scene import Scene
+from .overlap import overlap
+
+__all__ = ["Guard"]
+
+log = logging.getLogger(__name__)
+
+
+class Guard:
+    """Watches one run of a scene.
+
+    Memory: evenness and energy at the onset, and failed elements at the last step, and how deep faces overlapped;
+    `check_step`, `check_record`, `check_overlap`, `check_end` and `even` judge by them.
+
+    Parameters
+    ----------
+    scene: what is computed, with the tolerance `balance_tolerance` of its ledger.
+    momentum: of the run; its last force evaluation and its density are looked at.
+    """
+
+    LOCKS = 50.0           # k/mu past which the plain element is warned of
+    STIFF = 2e4            # k/mu past which rounding comes near the equilibria
+    COARSE = 1.2           # l/h below which the mesh decides where and when it cracks
+    NARROW = 0.1           # width of an element, of the median one, below which it governs the explicit step
+    SHARP = 60.0           # degrees by which a notch may turn at one node
+    CHECKERED = 0.1        # amplitude of an alternating pressure, of mu
+    FLAT = 0.2             # J below which a live point is close to being turned inside out
+    LIVE = 0.5             # gamma of a point that must not be inside out
+    NEGATIVE = -1e-6       # gamma below which a nodal density is no rounding
+    SUDDEN = 0.05, 20      # share of the elements, and their number, that may fail in one step
+    DEAD = 0.2             # mean density below which a body is gone
+    EVEN = 0.8, 0.9        # of the greatest W/Phi, and the share of the body from which on it is loaded evenly
+    DEEPER = 1.5           # times the depth at which an overlap was first seen, that is told at the end
+    CARRIED = 0.01         # energy in deleted elements, of the onset energy, that is warned of
+
+    def __init__(self, scene: Scene, momentum: Momentum) -> None:
+        self.scene, self.momentum = scene, momentum
+        self.space = scene.sample.space
+        self.scale = 0.0     #: energy at the onset, to which the others are compared
+        self.evenness = 0.0  #: share of the body that was loaded about as much as its weakest point at the onset
+        self.dissolved = False  #: whether a body that was loaded evenly has failed everywhere at once
+        self.step_share: Callable[[], float] = lambda: np.inf  #: explicit step over its stability limit, now
+        self._deleted = -1   # elements at the last step
+        self._inside_out = False
+        self.overlaps: list[float] = []  #: depth [mm] of an overlap of faces when it was first seen, and the greatest
+
+    @property
+    def _step_cure(self) -> str:
+        c = self.scene.controls
+        if c.analysis == "quasistatic":
+            return f"raise --front (now {c.statics.front:g}), or compute with --analysis dynamic"
+        if c.integrator == "explicit":
+            if (share := self._share_of_limit()) <= 1.0:
+                return (f"a shorter step is no cure, since this one is {share:.2f} of its stability limit: refine the "
+                        f"mesh there, or take --integrator hht")
+            return f"lower --courant (now {c.explicit.courant:g})"
+        return f"lower --hht-dt (now {c.hht.dt:g} s)"
+
+    def _share_of_limit(self) -> float:
+        """The explicit step over its stability limit; infinite where that cannot be told any more."""
+        try:
+            return self.step_share()
+        except SkfsinkError:
+            return np.inf
+
+    # --- before the run ---
+    def check_scene(self) -> None:
+        """Warn of a material, an element or a mesh beyond the range of the methods."""
+        space, l = self.space, self.scene.sink_law.length_scale
+        # the part that is least compressible for its shear modulus is the first to lock, and the first to lose digits
+        part = max(self.scene.parts, key=lambda part: part.material.bulk_modulus / part.material.shear_modulus)
+        ratio = part.material.bulk_modulus / part.material.shear_modulus
+        if self.scene.controls.element == "plain" and ratio > self.LOCKS:
+            log.warning("the plain element locks at k/mu = %.4g (above %g)%s: stiffness, onset load and U come out too "
+                        "high; take --element jbar", ratio, self.LOCKS, self._where(part))
+        if ratio > self.STIFF and self.scene.controls.element != "planestress":
+            log.warning("k/mu = %.3g%s is so large (above %g) that rounding comes near the tolerance of equilibria, "
+                        "and the explicit step falls with its root; with --bulk-modulus %.3g the solid is as good as "
+                        "incompressible", ratio, self._where(part), self.STIFF, 1e3 * part.material.shear_modulus)
+        h = float(space.h.min())
+        if h > l / self.COARSE:
+            log.warning("no element is finer than h = %.3g mm, l/h = %.2f (less than %g): onset and U are those of the "
+                        "mesh; refine it to h <= l/3, or raise --length-scale", h, l / h, self.COARSE)
+        angle, place = indicators.turning(space)
+        if angle > self.SHARP:
+            log.warning("a notch turns by %.0f degrees at one node, at %s mm (above %g): it is as sharp as elements "
+                        "are small, which moves onset and U; round it with at least 4 elements", angle,
+                        place_text(place), self.SHARP)
+        c = self.scene.controls
+        if c.analysis != "quasistatic" and c.integrator == "explicit":
+            self._check_widths()
+
+    def _check_widths(self) -> None:
+        """Elements that cut the explicit step for all others."""
+        widths = indicators.widths(self.space)
+        typical, e = float(np.median(widths)), int(np.argmin(widths))
+        if widths[e] < self.NARROW * typical:
+            log.warning("an element near %s mm is %.2g mm narrow, most are %.2g mm (a share less than %g): it makes "
+                        "the explicit step that much shorter for all; mend the mesh there, or take --integrator hht",
+                        place_text(self.space.X[self.space.conn[e]].mean(axis=0)), widths[e], typical, self.NARROW)
+
+    def check_onset(self, state: State) -> None:
+        """Look at the state at the onset: where it will crack, and whether it is an equilibrium worth starting from.
+
+        Raises
+        ------
+        InstabilityError
+            The ledger of the loading does not close, or a live point is inside out.
+        """
+        space, l = self.space, self.scene.sink_law.length_scale
+        self.evenness = self._even_share(state)
+        weakest = int(np.argmin(state.gamma))
+        h = indicators.size_near(space, weakest, l)
+        if h > l / self.COARSE:
+            log.warning("where it begins to fail, at %s mm, elements have h = %.3g mm, l/h = %.2f (less than %g): "
+                        "onset and U are those of the mesh; refine it there to h <= l/3, or raise --length-scale",
+                        place_text(space.X[weakest]), h, l / h, self.COARSE)
+        self._check_pressure(state)
+        error, allowed = state.ledger.error(state.ledger.elastic), self.scene.controls.balance_tolerance
+        if not error <= allowed:
+            raise InstabilityError(f"the ledger of the loading is open by {error:.2%} of the stored energy, allowed "
+                                   f"{allowed:.2%}: the body snaps or buckles on its way; hold it sideways, or raise "
+                                   f"--balance-tolerance")
+        self._check_shape(state)
+
+    def _even_share(self, state: State) -> float:
+        """Share of the volume whose W/Phi is at least `EVEN` times the greatest one."""
+        phi = by_element(self.space.n_elements, self.scene.sink_law.phi, self.scene.regions,
+                         lambda region: region.sink_law.phi)
+        ratio = state.W_max.max(axis=1) / phi
+        V = self.space.V
+        return float(V[ratio >= self.EVEN[0] * ratio.max()].sum() / V.sum())
+
+    @property
+    def even(self) -> bool:
+        """Whether the body was loaded evenly at the onset, as a material point is."""
+        return self.evenness > self.EVEN[1]
+
+    def _has_dissolved(self) -> bool:
+        """Whether this body may fail everywhere at once, since it is loaded evenly; it has, then."""
+        self.dissolved = self.dissolved or self.even
+        return self.dissolved
+
+    def _check_pressure(self, state: State) -> None:
+        """Pressures that alternate, in each material for itself: they jump from one to another."""
+        if self.scene.controls.element != "jbar":
+            return
+        for part in self.scene.parts:
+            k = part.material.bulk_modulus
+            amplitude = indicators.alternation(self.space, indicators.element_pressure(self.space, state.u, k),
+                                               part.elements)
+            if amplitude > self.CHECKERED * part.material.shear_modulus:
+                log.warning("pressures of neighbouring elements alternate by %.3g MPa (above %g mu)%s: a checkerboard, "
+                            "with %.2g of the energy limiter; break up the rows of the mesh, or lower --bulk-modulus",
+                            amplitude, self.CHECKERED, self._where(part), amplitude**2 / (2 * k) / part.sink_law.phi)
+
+    def _where(self, part: Region) -> str:
+        """Of which material a warning speaks, if there are several."""
+        if len(self.scene.parts) == 1:
+            return ""
+        return f" in region {part.name}" if part.name else " outside of the regions"
+
+    # --- during the event ---
+    def check_step(self, state: State) -> None:
+        """Look at what every step leaves behind; a few comparisons.
+
+        Raises
+        ------
+        InstabilityError
+            Energy has been fed in, or is no number; too much failed at once; a live point is inside out.
+        """
+        ledger = state.ledger
+        fed = -ledger.numerical / ledger.scale(self.scale)
+        allowed = self.scene.controls.balance_tolerance
+        if not (fed <= allowed and np.isfinite(ledger.elastic + ledger.kinetic)):
+            raise InstabilityError(f"energy fed in by the integrator {fed:.2%} of the onset energy at "
+                                   f"{self._when(state)}, allowed {allowed:.2%}: {self._step_cure}; only then raise "
+                                   f"--balance-tolerance")
+        before, self._deleted = self._deleted, len(state.deletions)
+        failed, share = self._deleted - before, self.SUDDEN[0] * self.space.n_elements
+        if before >= 0 and failed > max(share, self.SUDDEN[1]) and not self._has_dissolved():
+            raise InstabilityError(f"{failed} of {self.space.n_elements} elements failed in one step at "
+                                   f"{self._when(state)}, allowed {max(int(share), self.SUDDEN[1])}: this is no crack "
+                                   f"but a mesh that dies of a bad state; {self._step_cure}")
+        if self.momentum.least_J <= 0.0 and not self._inside_out:
+            self._check_shape(state)
+
+    def check_record(self, state: State) -> None:
+        """Look at the whole state, at each row of the history.
+
+        Raises
+        ------
+        InstabilityError
+            The ledger is open, a field is not finite, the body is gone, or a live point is inside out.
+        """
+        ledger, space, l = state.ledger, self.space, self.scene.sink_law.length_scale
+        allowed, scale = self.scene.controls.balance_tolerance, ledger.scale(self.scale)
+        worst, name = max((ledger.error(scale), "energy balance error"),
+                          (ledger.deletion / scale, "energy lost in deleted elements"), key=_nan_first)
+        if not worst <= allowed:
+            cure = self._deletion_cure if "deleted" in name else self._step_cure
+            raise InstabilityError(f"{name} {worst:.2%} of the onset energy at {self._when(state)}, allowed "
+                                   f"{allowed:.2%}: {cure}; only then raise --balance-tolerance")
+        if not (np.isfinite(state.u).all() and np.isfinite(state.v).all() and np.isfinite(state.gamma).all()):
+            raise InstabilityError(f"a field is not finite at {self._when(state)}: {self._step_cure}")
+        if ledger.deletion > self.CARRIED * scale:
+            log.warning("elements were deleted with %.2g of the onset energy still in them (above %g): %s",
+                        ledger.deletion / scale, self.CARRIED, self._deletion_cure)
+        if ledger.numerical > allowed * scale:
+            log.warning("the time integration itself has dissipated %.2g of the onset energy (above %g): %s%s",
+                        ledger.numerical / scale, allowed, self._step_cure,
+                        ", or an --hht-alpha nearer to 0" if self.scene.controls.integrator == "hht" else "")
+        least = float(state.gamma.min())
+        if least < self.NEGATIVE:
+            log.warning("the relative density falls to %.2g: the %s sink has no maximum principle; such points are "
+                        "taken as dead. --sink lumped keeps it in (0, 1]", least, self.scene.controls.sink)
+        if indicators.mean_density(space, state.gamma) < self.DEAD and not self._has_dissolved():
+            raise InstabilityError(f"less than {self.DEAD:.0%} of the body is left at {self._when(state)}: this is no "
+                                   f"crack but a mesh that dies of a bad state; {self._step_cure}")
+        h = space.h[state.deleted]
+        coarse = h > l / self.COARSE
+        if coarse.sum() > max(2, 0.2 * h.size):
+            e = int(np.flatnonzero(state.deleted)[np.argmax(h)])
+            log.warning("the crack runs through elements of h = %.3g mm, l/h = %.2f (less than %g), near %s mm: its "
+                        "width and U are those of the mesh there; refine it to h <= l/3", float(h.max()),
+                        l / float(h.max()), self.COARSE, place_text(space.X[space.conn[e]].mean(axis=0)))
+        if self.momentum.least_J < self.FLAT:
+            self._check_shape(state)
+
+    def _check_shape(self, state: State) -> None:
+        """Live points that are nearly or wholly inside out."""
+        least = self.momentum.least_J
+        if least >= self.FLAT:
+            return
+        count, gamma = indicators.inverted(self.space, state.u, self.momentum.gamma)
+        if gamma > self.LIVE:
+            raise InstabilityError(f"{count} Gauss point(s) with a relative density of up to {gamma:.2f} are inside "
+                                   f"out (J <= 0) at {self._when(state)}: {self._step_cure}, or refine the mesh there")
+        if count:
+            self._inside_out = True
+            log.warning("%d damaged Gauss point(s) are inside out (J <= 0), with a relative density of up to %.2g: "
+                        "their force means nothing; raise --force-floor, or refine the mesh there", count, gamma)
+        else:
+            log.warning("a live Gauss point is compressed to J = %.2g (below %g): elements soon turn inside out there; "
+                        "refine the mesh where it is pressed", least, self.FLAT)
+
+    # --- at the frames ---
+    def check_overlap(self, state: State) -> None:
+        """Faces of a notch or a crack that have passed through each other; costs as much as a few steps."""
+        found = overlap(self.space, state.u, state.gamma, state.deleted)
+        if found is None:
+            return
+        first, most = self.overlaps or (found.depth, found.depth)
+        self.overlaps = [first, max(most, found.depth)]
+        log.warning("faces pass through each other by %.3g mm at %s, near %s mm of the undeformed body (%.2g of the "
+                    "element there): there is no contact, and what follows is a body that reaches into itself; end the "
+                    "loading before they meet, or give the notch more width", found.depth, self._when(state),
+                    place_text(found.place), found.depth / found.size)
+
+    def check_stress(self, state: State, crushed: np.ndarray) -> None:
+        """Elements, a mask (ne,), whose stress is unknown, see :func:`.cauchy_stress`."""
+        if crushed.any():
+            first = self.space.conn[int(np.argmax(crushed))]
+            log.warning("the stress of %d element(s) is not known at %s, as of one near %s mm: a point that exerts a "
+                        "force is crushed or inside out there; frames have NaN for it, and 1 in the field crushed; "
+                        "refine the mesh where it is pressed, or raise --force-floor", crushed.sum(), self._when(state),
+                        place_text(self.space.X[first].mean(axis=0)))
+
+    def check_end(self) -> None:
+        """Say to what depth faces have passed through each other, if that was more than when it was first seen."""
+        if self.overlaps and self.overlaps[1] > self.DEEPER * self.overlaps[0]:
+            log.warning("faces have passed through each other by up to %.3g mm: there is no contact", self.overlaps[1])
+
+    @property
+    def _deletion_cure(self) -> str:
+        c = self.scene.controls
+        return f"lower --deletion (now {c.deletion:g}) or raise --force-floor (now {c.force_floor:g}) above it"
+
+    def _when(self, state: State) -> str:
+        if self.scene.controls.analysis == "quasistatic" and state.phase == "event":
+            return f"sweep {state.step}"
+        return f"t = {state.time:.4g} s"
+
+
+def _nan_first(entry: tuple[float, str]) -> float:
+    return np.inf if np.isnan(entry[0]) else entry[0]

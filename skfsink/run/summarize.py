@@ -1,0 +1,83 @@
+"""The summary of a finished run (schema version 2)."""
+
+from __future__ import annotations
+
+import resource
+import sys
+from typing import Any
+
+import numpy as np
+
+from ..results.history import history_units, load_name
+from ..results.summary import versions
+from ..scene.scene import Scene
+from .material_point import beside_theory
+from .places import greatest_ratio
+from .quantities import measured
+from .simulate import Simulation
+from .verdict import verdict
+
+__all__ = ["SCHEMA", "peak_rss_mb", "summarize"]
+
+SCHEMA = 2   # 1 had "reaction_N_per_mm" for the force [N] on bodies in space, and no "units"
+
+
+def peak_rss_mb() -> float:
+    """Greatest memory this process has used [MB]."""
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak / 1e6 if sys.platform == "darwin" else peak / 1e3
+
+
+def summarize(scene: Scene, simulation: Simulation) -> dict[str, Any]:
+    """Summary of a finished run; figures of the onset and of the event are null in one that did not fail."""
+    state, recorder = simulation.state, simulation.recorder
+    ledger, onset, tracker = state.ledger, recorder.onset, recorder.tracker
+    space, cost = scene.sample.space, simulation.cost()
+    dynamic = scene.controls.analysis == "dynamic"
+    units = history_units(space.dim)
+    balances = [abs(row["balance"]) for row in recorder.history.rows if row["phase"] != "loading"]
+    ratio, place = greatest_ratio(simulation.density, state)
+    if "ratio" in onset:  # while it was loaded; beyond, W of dead points grows without meaning
+        ratio, place = onset["ratio"], onset["place_of_ratio"]
+    return {
+        "schema": SCHEMA, "case": scene.case, "mesh": scene.sample.name, "analysis": scene.controls.analysis,
+        "integrator": scene.controls.integrator if dynamic else None, "verdict": verdict(scene, simulation),
+        "elements": space.n_elements, "dofs": int(simulation.free.sum()) + space.n_nodes,
+        "unknowns": {"displacement": int(simulation.free.sum()), "density": space.n_nodes},
+        "units": {"load": units["reaction_N_per_mm"], "energy": units["elastic"]},
+        "loading": {"greatest_load": recorder.greatest.get("load"),
+                    "displacement_at_greatest_load_mm": recorder.greatest.get("displacement_mm"),
+                    "greatest_W_over_phi": ratio, "place_of_greatest_W_over_phi_mm": place},
+        "material_point": _material_point(scene, simulation),
+        "onset": {"displacement_mm": onset.get("displacement_mm"),
+                  load_name(space.dim): onset.get("reaction_N_per_mm"),
+                  **{k: onset.get(k) for k in ("elastic_energy", "gamma_min", "place_mm", "boundary")}},
+        "event": {"first_arrival_s": tracker.arrival if dynamic else None,
+                  "first_arrival_sweep": None if dynamic else tracker.arrival,
+                  "mean_tip_speed_m_per_s": tracker.mean_speed() if dynamic else None,
+                  "max_branches": tracker.max_branches, "separated": tracker.separated,
+                  "duration_s": state.time if dynamic and onset else None},
+        "energy": {"U_paper_at_arrival": recorder.at_arrival.get("U_paper"), "U_paper_final": ledger.paper,
+                   "D_sink_at_arrival": recorder.at_arrival.get("D_sink"), "D_sink_final": ledger.sink,
+                   "D_sink_stored": ledger.sink_stored, "D_sink_kinetic": ledger.sink_kinetic,
+                   "initial": ledger.initial, "elastic_final": ledger.elastic, "kinetic_final": ledger.kinetic,
+                   "external_work": onset.get("work", 0.0) + ledger.work, "deletion": ledger.deletion,
+                   "numerical": ledger.numerical, "released": ledger.released,
+                   "balance_error_relative": max(balances, default=0.0) / onset["elastic_energy"] if onset else None},
+        "quantities": measured(scene, recorder), "model": dict(scene.choice) or None,
+        "whole": {"energy": scene.whole.energy, "load": scene.whole.load, "displacement": scene.whole.displacement},
+        "deleted_elements": int(state.deleted.sum()), "warnings": simulation.notes.texts,
+        "notes": list(scene.sample.notes),
+        "cost": {"wall_s": {k: round(v, 3) for k, v in cost["wall"].items()}, "steps": cost["steps"],
+                 "gamma_solves": cost["gamma_solves"], "factorisations": cost["factorisations"],
+                 "peak_rss_mb": round(peak_rss_mb(), 1)},
+        "versions": versions(), "assumed": list(scene.assumed), "moments": recorder.moments,
+        "series": "loading" if simulation.unfailed else "run"}
+
+
+def _material_point(scene: Scene, simulation: Simulation) -> dict[str, Any] | None:
+    """Strength beside theory of a body that was loaded evenly."""
+    greatest = simulation.recorder.greatest
+    if not simulation.recorder.guard.even or "F" not in greatest or scene.tractions:
+        return None
+    return beside_theory(scene, np.array(greatest["F"]), np.array(greatest["P"]))

@@ -1,0 +1,51 @@
+"""What became of a run, in one line: cracked, arrested, still running, failed everywhere, or not failed at all."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import place_text
+from ..scene.scene import Scene
+from .places import greatest_ratio
+from .simulate import Simulation
+
+__all__ = ["verdict"]
+
+SOFTENED = 0.99  # least gamma of a body that has kept its strength
+
+
+def verdict(scene: Scene, simulation: Simulation) -> str:
+    """One line on what happened in a finished run."""
+    state, tracker, event = simulation.state, simulation.recorder.tracker, scene.controls.event_time
+    if simulation.unfailed:
+        ratio, place = greatest_ratio(simulation.density, state)
+        least = float(state.gamma.min())
+        soft = f"; the body has softened to gamma = {least:.3g}" if least < SOFTENED else ""
+        return (f"nothing failed: the greatest W/Phi was {ratio:.3g}, at {place_text(place)} mm, where points fail "
+                f"near 1{soft}; the loading ended because {simulation.unfailed}")
+    if simulation.dissolved:
+        return f"failed everywhere at once, {_when(scene, state.time)}: no place of it was weaker than another"
+    cracked = np.isfinite(tracker.cracked_at)
+    even = simulation.recorder.guard.even
+    quasistatic = scene.controls.analysis == "quasistatic"
+    if not cracked.any():
+        why = ("the body is loaded evenly, and no place of it is weaker than another; its result is the greatest load"
+               if even else simulation.statics.arrested or "what has begun takes a longer event_time to run away")
+        when = "past the onset" if quasistatic else f"in the event_time of {event:g} s"
+        return f"nothing cracked {when}, least gamma {state.gamma.min():.3g}: {why}"
+    if tracker.separated:
+        first = "" if tracker.arrival is None else f", arrived first {_when(scene, tracker.arrival)}"
+        return f"cracked and separated{first}; apart {_when(scene, simulation.recorder.separated_at)}"
+    last = simulation.recorder.history.rows[-1]
+    tip = f"{place_text(last[f'tip_{x}_mm'] for x in 'xyz'[:scene.sample.space.dim])} mm"
+    if quasistatic and simulation.statics.arrested:
+        return f"arrested at {tip}: {simulation.statics.arrested}"
+    if last["tips"]:
+        return f"the crack was still running at event_time = {event:g} s: its tip is at {tip}"
+    arrived = "" if tracker.arrival is None else f" after it had arrived {_when(scene, tracker.arrival)}"
+    return f"arrested at {tip}{arrived}: no tip has moved for 5 l/c_s at the end of the event"
+
+
+def _when(scene: Scene, clock: float) -> str:
+    """A time of the event, or a sweep."""
+    return f"in sweep {clock:.0f}" if scene.controls.analysis == "quasistatic" else f"at {clock * 1e6:.4g} µs"

@@ -1,0 +1,96 @@
+"""How a scene is computed."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field
+
+import numba
+
+from ..errors import ParameterError, require
+from ..fields.density import SINKS
+from ..fields.momentum import ELEMENTS
+from ..methods.controls import ExplicitControls, HHTControls, StaticsControls
+
+__all__ = ["ANALYSES", "INTEGRATORS", "STARTS", "Controls", "choose"]
+
+ANALYSES = ("dynamic", "quasistatic", "both")
+INTEGRATORS = ("explicit", "hht")
+STARTS = ("onset", "rest")
+
+
+def choose(name: str, value: str, allowed: tuple[str, ...]) -> str:
+    """Return `value` if it is one of the words allowed for `name`."""
+    if value not in allowed:
+        raise ParameterError(f"{name} must be one of {', '.join(allowed)}; got {value!r}")
+    return value
+
+
+@dataclass(frozen=True)
+class Controls:
+    """How a scene is computed.
+
+    Parameters
+    ----------
+    analysis: "dynamic" or "quasistatic" ("both" is two runs).
+    integrator: "explicit" or "hht", for the dynamic event.
+    sink: "lumped", "consistent" or "nearest".
+    element: "jbar", "plain" or "planestress" (thin sheets in two dimensions).
+    overshoot: how far past the onset the state is scaled before the event, relative to the displacement, (0, 0.1].
+    deletion: gamma at which an element fails, (0, 1e-2].
+    force_floor: gamma below which a Gauss point exerts no force, [0, 0.1].
+    event_time: longest dynamic event [s], > 0.
+    aftermath: time for which it goes on after the sample has come apart [s], >= 0.
+    record_every: time between rows of the history [s], > 0.
+    frame_every: time between frames of the ParaView series [s], > 0.
+    balance_tolerance: balance error, relative to the onset energy, at which a run is stopped, (0, 1].
+    checkpoint_every: wall time between checkpoints [s], > 0.
+    threads: that share factorisations and loops over elements, >= 0; 0 takes one for a plane body and else
+        OMP_NUM_THREADS or the machine's cores, at most 4. Runs with the same number agree to the last bit.
+    start: of a dynamic analysis, "onset" (statics up to there) or "rest" (see :mod:`.rest`).
+    active_zone: explicit steps solve for gamma only where it changes (see :mod:`.active_zone`).
+    """
+
+    analysis: str = "dynamic"
+    integrator: str = "explicit"
+    sink: str = "lumped"
+    element: str = "jbar"
+    overshoot: float = 0.005
+    deletion: float = 1e-6
+    force_floor: float = 1e-3
+    event_time: float = 2e-4
+    aftermath: float = 1e-5
+    record_every: float = 1e-6
+    frame_every: float = 5e-6
+    balance_tolerance: float = 0.05
+    checkpoint_every: float = 20.0
+    threads: int = 0
+    start: str = "onset"
+    active_zone: bool = True
+    explicit: ExplicitControls = field(default_factory=ExplicitControls)
+    hht: HHTControls = field(default_factory=HHTControls)
+    statics: StaticsControls = field(default_factory=StaticsControls)
+
+    def __post_init__(self) -> None:
+        choose("analysis", self.analysis, ANALYSES)
+        choose("integrator", self.integrator, INTEGRATORS)
+        choose("start", self.start, STARTS)
+        if self.start == "rest" and self.analysis != "dynamic":
+            raise ParameterError(f"start rest is for analysis dynamic; got {self.analysis}")
+        choose("sink", self.sink, SINKS)
+        choose("element", self.element, ELEMENTS)
+        require("overshoot", self.overshoot, low=0, high=0.1, low_open=True)
+        require("deletion", self.deletion, low=0, high=1e-2, low_open=True)
+        require("force-floor", self.force_floor, low=0, high=0.1)
+        for name in ("event_time", "record_every", "frame_every", "checkpoint_every"):
+            require(name.replace("_", "-"), getattr(self, name), "s", low=0, low_open=True)
+        require("aftermath", self.aftermath, "s", low=0)
+        require("balance-tolerance", self.balance_tolerance, low=0, high=1, low_open=True)
+        require("threads", self.threads, low=0, high=256, whole=True)
+
+    def workers(self, dim: int) -> int:
+        """Number of threads to use for a body of that dimension, >= 1."""
+        asked = os.environ.get("OMP_NUM_THREADS", "")
+        most: int = numba.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]
+        cores = int(asked) if asked.isdecimal() and int(asked) else most
+        return self.threads or (1 if dim == 2 else min(cores, 4))

@@ -1,0 +1,287 @@
+"""Options that all cases share: material, sink, loading, analysis, integrator, controls, output."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Annotated, Any
+
+from cyclopts import Group, Parameter, Token
+
+from ..errors import ParameterError, require
+from ..material import (
+    AAA,
+    LIMITERS,
+    MATERIALS,
+    MODULI,
+    Material,
+    SinkLaw,
+    constant_names,
+    constants_text,
+    material_of,
+    own_constants,
+)
+from ..methods.controls import ExplicitControls, HHTControls, StaticsControls
+from .controls import Controls, choose
+
+__all__ = ["LAYOUTS", "QUANTITIES", "SAMPLE", "Options"]
+
+# say where a run goes, or how its model was chosen, not what it is
+NOT_PHYSICS = ("model", "tolerance", "quantity", "corridor", "out", "resume", "overwrite", "quiet", "kept", "given")
+LAYOUTS = ("corridor", "uniform", "two-pass")
+QUANTITIES = ("onset_load", "onset_displacement", "U", "D", "arrival_time", "tip_speed", "crack_path")
+
+
+def _number(kind: type, tokens: Sequence[Token]) -> Any:
+    """The number in the text, or the text itself: :func:`require` then says which numbers are allowed."""
+    try:
+        return kind(tokens[0].value)
+    except ValueError:
+        return tokens[0].value
+
+
+def _numbers(name: str) -> Parameter:
+    """Numbers, and words, that `--help` shows together."""
+    return Parameter(group=Group.create_ordered(name), converter=_number)
+
+
+SAMPLE, MODEL, MATERIAL, SINK, LOADING, ANALYSIS, EXPLICIT, HHT, CONTROLS = map(_numbers, (
+    "Sample", "Model", "Material", "Sink", "Loading", "Analysis", "Explicit integrator", "HHT integrator", "Controls"))
+OUTPUT = Parameter(group=Group.create_ordered("Output"))
+MODEL_FLAG = Parameter(group=MODEL.group)
+FLAG = Parameter(negative="", show_default=False)
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Options:
+    """What every case can be asked for besides its dimensions; plain numbers in N, mm, MPa, s.
+
+    Parameters
+    ----------
+    model
+        "auto" (the cheapest one whose measured error is within `tolerance`), or a model by name: onset, statics,
+        dynamics, full; with -half, -slab, -plane-stress, -uniform, -two-pass, -everywhere as far as the case has them.
+        It sets the options of this group, `analysis`, `integrator`, and where it has to `element` and `event_time`.
+    tolerance
+        Of "auto": greatest relative error of `quantity`, > 0.
+    quantity
+        What "auto" is to get right: "onset_load", "onset_displacement", "U", "D", "arrival_time", "tip_speed" or
+        "crack_path".
+    start
+        Of a dynamic analysis: "onset" (statics up to there) or "rest" (dynamics from the unloaded body on).
+    half
+        Compute the half (dog-bone: quarter) that mirror symmetry leaves.
+    dimensions
+        2 or 3; 3 makes a plate a slab of one layer of hexahedra. 0 takes those of the sample.
+    mesh_layout
+        "corridor" (fine where a crack may run), "uniform" (fine everywhere; needs gmsh) or "two-pass" (fine along the
+        path of a first pass on elements twice as large; needs gmsh, or is "corridor").
+    active_zone
+        Explicit steps solve for γ only where it changes.
+    material
+        Law of the stored energy: "aaa" (the paper's), "neo-hookean", "yeoh", "mooney-rivlin", "gent", "arruda-boyce"
+        or "hgo"; `skfsink material NAME` shows one.
+    c1
+        First constant of aaa [MPa], > 0.
+    c2
+        Second constant of aaa [MPa], >= 0.
+    constants
+        Constants of another law than aaa, as "mu = 0.27 MPa, limit = 76.5"; those left out have their defaults. Of
+        all laws but hgo also "E = 1 MPa, nu = 0.499" or "G = 0.33 MPa, nu = 0.499" in place of bulk_modulus and of
+        mu or c1.
+    bulk_modulus
+        Bulk modulus k [MPa], > 0.
+    density
+        Density of the intact material ρ0 [kg/m^3], > 0.
+    phi
+        Energy limiter Φ [MPa], > 0; 0 takes the one that belongs to the law's default constants (aaa: 0.1686).
+    m
+        Sharpness of the energy limiter, >= 1.
+    length_scale
+        Characteristic length l of damage [mm], > 0.
+    sink
+        Quadrature of the sink: "lumped" (row sums), "consistent" (the paper's) or "nearest" (node).
+    deletion
+        γ at which an element fails, in (0, 0.01].
+    force_floor
+        γ below which a Gauss point exerts no force, in [0, 0.1].
+    speed
+        Speed of a grip [mm/s], > 0.
+    overshoot
+        Scaling of the state past the onset, relative to the onset displacement, in (0, 0.1].
+    analysis
+        "dynamic", "quasistatic" or "both".
+    integrator
+        Of the dynamic event: "explicit" or "hht".
+    front
+        Quasi-static: a sweep fails the points with at least this share of the greatest stored energy, in [0, 1].
+    element
+        "jbar" (element-constant J̄), "plain" (standard Q1, locks) or "planestress" (thin sheet with free faces, in 2D).
+    event_time
+        Longest dynamic event [s], > 0.
+    aftermath
+        Time for which the event goes on after the sample has come apart [s], >= 0.
+    courant
+        Explicit step over the stability limit estimated for the deformed state, in (0, 1].
+    gamma_every
+        Explicit steps between solves for γ, >= 0; 0 takes as many as fit in 0.03 l/c_s (0.1 µs), at most 20.
+    mass_floor
+        Least lumped mass of a node, relative to the intact one, in [0, 1).
+    hht_alpha
+        Damping parameter α of HHT, in [-1/3, 0].
+    hht_dt
+        Largest time step of HHT [s], > 0.
+    coupling
+        Of the two fields in an HHT step: "iterated" or "single" (one pass).
+    mass
+        Of HHT: "lumped" (row sums, as in the explicit scheme) or "consistent" (the paper's).
+    balance_tolerance
+        Energy balance error, relative to the onset energy, at which the run stops, in (0, 1].
+    record_every
+        Time between rows of history.csv [s], > 0.
+    frame_every
+        Time between frames of the ParaView series [s], > 0.
+    checkpoint_every
+        Wall time between checkpoints [s], > 0.
+    threads
+        Threads that share factorisations and loops over elements, >= 0; 0 takes one for a plane body and else
+        OMP_NUM_THREADS or the machine's cores, at most 4. Runs with the same number agree to the last bit.
+    out
+        Output folder; default results/CASE/MESH-ANALYSIS[-INTEGRATOR].
+    resume
+        Folder of an interrupted run to go on with; its scene.toml rules.
+    overwrite
+        Use an output folder that is not empty.
+    quiet
+        Show no progress.
+    corridor
+        Mesh that the first of two passes has left; set by the run.
+    kept
+        Mesh of the body that the run has left in its folder; set by the run.
+    given
+        Names of the options that a command line gave; a resumed run checks that they are its own.
+    """
+
+    model: Annotated[str, MODEL] = ""
+    tolerance: Annotated[float, MODEL] = 0.05
+    quantity: Annotated[str, MODEL] = "U"
+    start: Annotated[str, MODEL] = "onset"
+    half: Annotated[bool, MODEL_FLAG] = False
+    dimensions: Annotated[int, MODEL] = 0
+    mesh_layout: Annotated[str, MODEL] = "corridor"
+    active_zone: Annotated[bool, MODEL_FLAG] = True
+    material: Annotated[str, MATERIAL] = "aaa"
+    c1: Annotated[float, MATERIAL] = 0.617
+    c2: Annotated[float, MATERIAL] = 1.215
+    constants: Annotated[str, MATERIAL] = ""
+    bulk_modulus: Annotated[float, MATERIAL] = 500.0
+    density: Annotated[float, MATERIAL] = 1433.0
+    phi: Annotated[float, SINK] = 0.0
+    m: Annotated[float, SINK, Parameter(name=["--m"])] = 10.0
+    length_scale: Annotated[float, SINK] = 0.1
+    sink: Annotated[str, SINK] = "lumped"
+    deletion: Annotated[float, SINK] = 1e-6
+    force_floor: Annotated[float, SINK] = 1e-3
+    speed: Annotated[float, LOADING] = 1e-3
+    overshoot: Annotated[float, LOADING] = 0.005
+    analysis: Annotated[str, ANALYSIS] = "dynamic"
+    integrator: Annotated[str, ANALYSIS] = "explicit"
+    front: Annotated[float, ANALYSIS] = 0.8
+    element: Annotated[str, ANALYSIS] = "jbar"
+    event_time: Annotated[float, ANALYSIS] = 2e-4
+    aftermath: Annotated[float, ANALYSIS] = 1e-5
+    courant: Annotated[float, EXPLICIT] = 0.8
+    gamma_every: Annotated[int, EXPLICIT] = 0
+    mass_floor: Annotated[float, EXPLICIT] = 1e-3
+    hht_alpha: Annotated[float, HHT] = -0.05
+    hht_dt: Annotated[float, HHT] = 1.6e-7
+    coupling: Annotated[str, HHT] = "iterated"
+    mass: Annotated[str, HHT] = "lumped"
+    balance_tolerance: Annotated[float, CONTROLS] = 0.05
+    record_every: Annotated[float, CONTROLS] = 1e-6
+    frame_every: Annotated[float, CONTROLS] = 5e-6
+    checkpoint_every: Annotated[float, CONTROLS] = 20.0
+    threads: Annotated[int, CONTROLS] = 0
+    out: Annotated[Path | None, OUTPUT] = None
+    resume: Annotated[Path | None, OUTPUT] = None
+    overwrite: Annotated[bool, OUTPUT, FLAG] = False
+    quiet: Annotated[bool, OUTPUT, FLAG] = False
+    corridor: Annotated[Path | None, Parameter(parse=False)] = None
+    kept: Annotated[Path | None, Parameter(parse=False)] = None
+    given: Annotated[frozenset[str], Parameter(parse=False)] = frozenset()
+
+    def __post_init__(self) -> None:
+        for name in ("out", "resume", "corridor", "kept"):
+            if isinstance(folder := getattr(self, name), str):
+                object.__setattr__(self, name, Path(folder))
+        require("speed", self.speed, "mm/s", low=0, low_open=True)
+        require("tolerance", self.tolerance, low=0, low_open=True)
+        choose("quantity", self.quantity, QUANTITIES)
+        choose("mesh-layout", self.mesh_layout, LAYOUTS)
+        for name in ("half", "active_zone"):
+            if not isinstance(getattr(self, name), bool):
+                raise ParameterError(f"{name.replace('_', '-')} must be true or false; got {getattr(self, name)!r}")
+        if self.dimensions not in (0, 2, 3):
+            raise ParameterError(f"dimensions must be 2, 3, or 0 for those of the sample; got {self.dimensions!r}")
+        self.stored_energy(), self.sink_law(), self.controls()
+
+    def stored_energy(self) -> Material:
+        """The material."""
+        if self.material == "aaa" and not self.constants.strip():
+            return AAA(self.bulk_modulus, self.density, self.c1, self.c2)
+        text = self._constants()
+        of_nu = own_constants(self.material, text)[1] if self.material in MATERIALS else None
+        if of_nu is not None and ("bulk_modulus" in self.given or self.bulk_modulus != Options.bulk_modulus):
+            raise ParameterError(f"bulk_modulus {self.bulk_modulus!r} MPa and the nu of the constants ({of_nu:.6g} "
+                                 f"MPa) say the same: give one of them")
+        return material_of(self.material, text, self.bulk_modulus, self.density)
+
+    def _constants(self) -> str:
+        """Text of the constants of the law, with those of aaa that are options of their own."""
+        changed = [name for name in ("c1", "c2") if name in self.given or getattr(self, name) != getattr(Options, name)]
+        if self.material != "aaa":
+            for name in changed:
+                if getattr(self, name) != getattr(Options, name):
+                    raise ParameterError(f"{name} is a constant of aaa; those of {self.material} go into constants; "
+                                         f"got {getattr(self, name)!r}")
+            return self.constants
+        names = constant_names("aaa", self.constants)
+        if not names <= set(MODULI):
+            raise ParameterError(f"constants are those of another law than aaa, whose are c1 and c2, or E, G and nu; "
+                                 f"got {self.constants!r}")
+        stiff = names & {"E", "G"}
+        if stiff and "c1" in changed:
+            raise ParameterError(f"c1 {self.c1!r} MPa and the {min(stiff)} of the constants say the same: give one of "
+                                 f"them")
+        own = {"c2": require("c2", self.c2, "MPa"), **({} if stiff else {"c1": require("c1", self.c1, "MPa")})}
+        return ", ".join([*(f"{name} = {value!r} MPa" for name, value in own.items()), self.constants])
+
+    def sink_law(self) -> SinkLaw:
+        """The sink and flux laws."""
+        return SinkLaw(LIMITERS[self.material].phi if self.phi == 0 else self.phi, self.m, self.length_scale)
+
+    def controls(self) -> Controls:
+        """How to compute."""
+        return Controls(
+            self.analysis, self.integrator, self.sink, self.element, self.overshoot, self.deletion, self.force_floor,
+            self.event_time, self.aftermath, self.record_every, self.frame_every, self.balance_tolerance,
+            self.checkpoint_every, self.threads, self.start, self.active_zone,
+            ExplicitControls(self.courant, self.gamma_every, self.mass_floor),
+            HHTControls(self.hht_alpha, self.hht_dt, coupling=self.coupling, mass=self.mass,
+                        mass_floor=self.mass_floor),
+            StaticsControls(front=self.front))
+
+    def parameters(self) -> dict[str, Any]:
+        """The options that decide results, by name; the energy limiter is that of the law where it was 0.
+
+        E, G and nu have become constants of the law and the bulk modulus.
+        """
+        chosen = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in NOT_PHYSICS}
+        if set(MODULI) & constant_names(self.material, self.constants):
+            material = self.stored_energy()
+            chosen |= {"bulk_modulus": material.bulk_modulus, "constants": constants_text(material)}
+            if isinstance(material, AAA):
+                chosen |= {"c1": material.c1, "constants": ""}
+        return {**chosen, "phi": self.sink_law().phi}

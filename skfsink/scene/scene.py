@@ -1,0 +1,175 @@
+"""A scene: everything that defines a run, and its file `scene.toml`."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import tomli_w
+
+from ..errors import ParameterError
+from ..fields.momentum import check_element
+from ..loads.grips import Grip, Ramp, Traction
+from ..loads.schedule import Loading
+from ..material import Material, SinkLaw
+from ..material.regions import Region, check_lengths, divided
+from ..meshing.sample import Sample
+from ..meshing.symmetry import Whole
+from .controls import Controls
+from .digest import digest
+from .tables import split
+
+__all__ = ["Scene"]
+
+def _first_two(X: np.ndarray) -> np.ndarray:
+    return X[:, :2]
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A sample of a material, held by grips, and how to compute it.
+
+    Parameters
+    ----------
+    case: name of the case module.
+    title: for pictures.
+    parameters: the arguments of the case function, enough to make this scene again.
+    sample, material, sink_law: what is computed.
+    grips: the reaction of the first one that moves is the load that is reported, along its motion.
+    tractions: dead loads; without a grip that moves, the first one is the load that is reported.
+    regions: elements of other materials than `material`; no element is in two.
+    faces: in three dimensions, the surfaces of a sheet along which a crack runs; they are no edges it arrives at.
+    view: azimuth and elevation [degrees] from which pictures show a body in space.
+    rollers: boundaries held on planes of symmetry or between faces; they are no grips.
+    whole: factors from the figures of the body to those of the whole sample.
+    flat: maps points of the body (n, dim) to its section (n, 2) [mm].
+    controls: how it is computed.
+    assumed: statements about lengths that the paper does not print.
+    choice: of a model, as it is printed and stored; it does not decide results beyond the parameters.
+
+    Raises
+    ------
+    MeshError
+        The mesh lacks the boundary of a grip.
+    ParameterError
+        The element is not for meshes of this dimension, or a region for this body.
+    """
+
+    case: str
+    title: str
+    parameters: Mapping[str, Any]
+    sample: Sample
+    material: Material
+    sink_law: SinkLaw
+    grips: tuple[Grip, ...]
+    tractions: tuple[Traction, ...] = ()
+    regions: tuple[Region, ...] = ()
+    faces: tuple[str, ...] = ()
+    view: tuple[float, float] = (-75.0, 60.0)
+    rollers: tuple[Grip, ...] = ()
+    whole: Whole = Whole()  # noqa: RUF009
+    flat: Callable[[np.ndarray], np.ndarray] = _first_two
+    controls: Controls = field(default_factory=Controls)
+    assumed: tuple[str, ...] = ()
+    choice: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for boundary in (load.boundary for group in (self.grips, self.rollers, self.tractions) for load in group):
+            self.sample.nodes(boundary)
+        check_element(self.controls.element, self.sample.space)
+        check_lengths(self.sink_law, self.regions)
+        _ = self.parts
+        loading = self.loading()
+        if self.controls.start == "rest" and (loading.knots or self.tractions):
+            raise ParameterError("start rest is for grips of constant velocity; this scene has "
+                                 f"{'tractions' if self.tractions else 'ramps'}: take start onset")
+        if self.controls.start == "rest" and loading.speed(0.0) == 0.0:
+            raise ParameterError("start rest needs a grip that moves; all of them are still: give one a velocity, or "
+                                 "take start onset")
+
+    @property
+    def parts(self) -> tuple[Region, ...]:
+        """The body by its materials: what is in no region first, with an empty name, if there is any."""
+        return divided(self.sample.space.n_elements, self.material, self.sink_law, self.regions)
+
+    @property
+    def region_numbers(self) -> np.ndarray:
+        """Number of the region each element is in, from 1, (ne,); 0 where it is in none."""
+        numbers = np.zeros(self.sample.space.n_elements, np.int32)
+        for i, region in enumerate(self.regions):
+            numbers[region.elements] = i + 1
+        return numbers
+
+    def part(self, analysis: str) -> Scene:
+        """This scene in one of the two analyses."""
+        return replace(self, parameters={**self.parameters, "analysis": analysis},
+                       controls=replace(self.controls, analysis=analysis))
+
+    def loading(self) -> Loading:
+        """What is held, moved and pulled at each load time.
+
+        Raises
+        ------
+        ParameterError, MeshError
+            As of :class:`.Loading`.
+        """
+        nodes = self.sample.nodes
+        return Loading(self.sample.space, [(nodes(grip.boundary), grip) for grip in (*self.grips, *self.rollers)],
+                       [(nodes(traction.boundary), traction) for traction in self.tractions])
+
+    def constraints(self) -> tuple[np.ndarray, np.ndarray]:
+        """Mask of the free degrees of freedom (n*dim,) and velocity of the held ones at first (n, dim) [mm/s]."""
+        loading = self.loading()
+        return loading.free, loading.velocity(0.0)
+
+    @property
+    def moving(self) -> Grip | None:
+        """The first grip that moves at some time, None if there is none."""
+        return next((grip for grip in self.grips if any(isinstance(v, Ramp) or v for v in grip.velocity)), None)
+
+    @property
+    def opposite(self) -> Grip | None:
+        """The grip to which the motion of that one is relative: the last one, None if it is itself."""
+        return self.grips[-1] if self.grips and self.grips[-1] is not self.moving else None
+
+    @property
+    def speed(self) -> float:
+        """Speed at which the grips part at first [mm/s]."""
+        velocity = np.zeros((2, self.sample.space.dim))
+        for row, grip in zip(velocity, (self.moving, self.opposite)):
+            if grip is not None:
+                row[:] = [v.rate(0.0) if isinstance(v, Ramp) else v or 0.0 for v in grip.velocity]
+        return float(np.linalg.norm(velocity[0] - velocity[1]))
+
+    def toml(self, mesh: str = "") -> str:
+        """Text of `scene.toml`; `mesh` is the name of a file beside it that keeps the mesh of a file of the user's."""
+        head = ("# A run of skfsink. Run it again with: skfsink run scene.toml\n"
+                "# Plain numbers are in N, mm, MPa and s; density in kg/m^3.\n")
+        parameters = {k: v.item() if isinstance(v, np.generic) else v for k, v in self.parameters.items()}
+        source = {}
+        if mesh and self.sample.source:
+            parameters["mesh"], source = mesh, {"source": self.sample.source}
+        choice = {"choice": dict(self.choice)} if self.choice else {}
+        return head + tomli_w.dumps({"case": self.case, **source, **split(parameters), "assumed": list(self.assumed),
+                                     **choice})
+
+    @property
+    def fingerprint(self) -> str:
+        """Hash of all that decides the results of the run, whatever the scene was made from, and wherever the mesh is.
+
+        It has two parts, the older one of which checkpoints of earlier versions have alone; see :mod:`.checkpoint`.
+        """
+        text = replace(self, parameters={**self.parameters, "mesh": ""}, choice={}).toml()
+        hashed, space = hashlib.sha256(text.encode()), self.sample.space
+        for array in (space.X, space.conn, *(nodes for _, nodes in sorted(self.sample.boundaries.items()))):
+            hashed.update(array.tobytes())
+        hashed.update(f"{self.grips} {self.rollers} {self.tractions}".encode())
+        for region in self.regions:
+            hashed.update(f"{region.name} {region.material} {region.sink_law}".encode() + region.elements.tobytes())
+        controls = replace(self.controls, checkpoint_every=Controls.checkpoint_every)  # a checkpoint changes nothing
+        rest = digest([controls, self.material, self.sink_law, self.regions, self.grips, self.rollers, self.tractions,
+                       self.faces, self.whole, self.sample.boundaries])
+        return f"{hashed.hexdigest()}-{rest}"

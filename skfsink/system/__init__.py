@@ -1,0 +1,1 @@
+"""The machine beneath: files written as a whole, text as people save it, folders, compiled loops, committed data."""

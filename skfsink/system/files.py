@@ -1,0 +1,70 @@
+"""Files that a reader finds whole, at any moment and after a kill: the old content or the new, never a part."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from ..errors import OutputError
+
+__all__ = ["HIDDEN", "prepare_folder", "replaced", "reported", "write_atomic"]
+
+HIDDEN = (".lock", ".running")  # files of a lock, see :mod:`.occupied`; a folder that has no others is empty
+
+
+@contextmanager
+def reported(failure: str) -> Iterator[None]:
+    """Turn an error of the operating system into an OutputError."""
+    try:
+        yield
+    except OSError as error:
+        raise OutputError(f"{failure}: {error.strerror or error}") from error
+
+
+@contextmanager
+def replaced(path: str | Path) -> Iterator[Path]:
+    """Give the path of a temporary file beside `path`, and put that in its place once the block has filled it.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written. What stood at `path` before is untouched then, as after any other error.
+    """
+    part = Path(path).with_name(f".{Path(path).name}.part")
+    try:
+        with reported(f"cannot write {path}"):
+            yield part
+            with open(part, "r+b") as file:
+                os.fsync(file.fileno())
+            os.replace(part, path)
+    finally:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
+
+
+def write_atomic(path: str | Path, content: bytes | str) -> None:
+    """Write a file so that a reader finds the old content or the new, never a part. Text is UTF-8, lines end in LF."""
+    with replaced(path) as part:
+        part.write_bytes(content.encode() if isinstance(content, str) else content)
+
+
+def prepare_folder(path: str | Path, overwrite: bool = False) -> Path:
+    """Make the folder of a run, and try that it can be written to. Nothing in it is ever deleted.
+
+    Raises
+    ------
+    OutputError
+        It is no folder, cannot be written, or has something in it and `overwrite` was not given.
+    """
+    path = Path(path)
+    with reported(f"cannot write to the output folder {path}"):
+        if path.exists() and not path.is_dir():
+            raise OutputError(f"the output folder {path} is a file")
+        path.mkdir(parents=True, exist_ok=True)
+        if not overwrite and any(entry.name not in HIDDEN for entry in path.iterdir()):
+            raise OutputError(f"the output folder {path} is not empty; name another one, or allow to overwrite it")
+        tempfile.TemporaryFile(dir=path).close()
+    return path
