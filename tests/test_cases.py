@@ -52,7 +52,7 @@ def test_comes_apart_with_a_closed_ledger(both: Result) -> None:
 
 
 def test_dynamic_crack_dissipates_more(both: Result) -> None:
-    """Fails if inertia is lost, or if the static sweeps let damage spread: U of the paper must be larger in motion."""
+    """Fails if inertia is lost, or if the static passes let damage spread: U of the paper must be larger in motion."""
     dynamic, quasistatic = summaries(both)
     ratio = dynamic["energy"]["U_paper_at_arrival"] / quasistatic["energy"]["U_paper_at_arrival"]
     assert ratio > 1.1

@@ -212,12 +212,12 @@ def check_files(folder: Path, summary: dict[str, object]) -> None:
 
 
 def test_files_of_both_analyses(mesh: Path, tmp_path: Path) -> None:
-    """Fails if a file is missing, a key of schema 2 is, or a separated plate is not reported as such."""
+    """Fails if a file is missing, a key of schema 3 is, or a separated plate is not reported as such."""
     out = tmp_path / "a [b] c"  # a name that is markup to rich
     status, err, _ = invoke("--mesh", mesh, "--out", out, "--analysis", "both", "--frame-every", "2e-5", *SMALL)
     assert (status, err) == (0, "")
     summary = json.loads((out / "summary.json").read_text())
-    assert (summary["schema"], summary["case"], summary["mesh"]) == (2, "single_edge_notch", "plate")
+    assert (summary["schema"], summary["case"], summary["mesh"]) == (3, "single_edge_notch", "plate")
     assert (out / "comparison.png").is_file() and (out / "scene.toml").is_file()
     for analysis in ("dynamic", "quasistatic"):
         part = summary[analysis]

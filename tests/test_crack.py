@@ -82,13 +82,13 @@ def test_branches_and_tip_speed() -> None:
     assert track.look(41e-6, forked).branches == 2
 
 
-def test_a_clock_of_sweeps_is_no_time() -> None:
-    """Fails if ages in sweeps are compared with seconds, or a speed is made of sweeps."""
+def test_a_clock_of_passes_is_no_time() -> None:
+    """Fails if ages in passes are compared with seconds, or a speed is made of passes."""
     track, space = tracker(shear_wave_speed=None)
-    for sweep in range(1, 6):
-        gamma = line(space, 0, 0.1 * sweep)
-        track.mark(float(sweep), gamma)
-        tips = track.look(float(sweep), gamma)
+    for number in range(1, 6):
+        gamma = line(space, 0, 0.1 * number)
+        track.mark(float(number), gamma)
+        tips = track.look(float(number), gamma)
         assert (tips.active, tips.speed) == (1, 0.0)
     assert track.look(5.0 + ADVANCES - 1, gamma).active == 1
     arrested = track.look(5.0 + ADVANCES, gamma)

@@ -190,7 +190,7 @@ def test_defaults_in_the_table_of_options_are_those_of_the_program() -> None:
 def test_numbers_of_the_loading_are_those_of_the_program() -> None:
     """Fails if the page of methods gives other limits of Newton's method than the program has."""
     controls = StaticsControls()
-    said = re.search(r"\*\*Limits\.\*\* (\d+) steps for each equilibrium.* at most (\d+) passes.*?; (\d+)\s+in a sweep",
+    said = re.search(r"\*\*Limits\.\*\* (\d+) steps for each equilibrium.* at most (\d+) passes.*?; (\d+)\s+in a pass",
                      PAGES["docs/methods.md"], re.DOTALL)
     assert said and [int(n) for n in said.groups()] == [controls.max_newton, controls.max_passes, Statics.SNAP]
 

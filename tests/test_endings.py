@@ -31,8 +31,8 @@ EXAMPLES = settings(max_examples=20, deadline=None, derandomize=True, database=N
 
 
 @pytest.fixture(autouse=True)
-def few_sweeps(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A quasi-static event ends after eight sweeps, wherever it is."""
+def few_passes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A quasi-static event ends after eight passes, wherever it is."""
     propagate = Statics.propagate
     monkeypatch.setattr(Statics, "propagate", lambda self, state: islice(propagate(self, state), 8))
 

@@ -58,8 +58,8 @@ def test_long_hht_steps_are_cut_and_said_so(tmp_path: Path):
     assert sim.state.deleted.mean() < 0.15
 
 
-def test_unconverged_sweep_is_not_followed(monkeypatch: pytest.MonkeyPatch):
-    """Fails if the history follows a state that is no equilibrium: the sweep must end the run, and change nothing."""
+def test_unconverged_pass_is_not_followed(monkeypatch: pytest.MonkeyPatch):
+    """Fails if the history follows a state that is no equilibrium: the pass must end the run, and change nothing."""
     state = NOTCHED.onset
     state.u *= 1.01
     state.grip *= 1.01
@@ -67,7 +67,7 @@ def test_unconverged_sweep_is_not_followed(monkeypatch: pytest.MonkeyPatch):
     before = onset_copy(state)
     statics = NOTCHED.statics()
     monkeypatch.setattr(statics, "SNAP", 1)
-    with pytest.raises(ConvergenceError, match=r"sweep 1: no equilibrium within 1 Newton steps; the history follows"):
+    with pytest.raises(ConvergenceError, match=r"pass 1: no equilibrium within 1 Newton steps; the history follows"):
         next(statics.propagate(state))
     for name in ("u", "gamma", "W_max", "deleted"):
         np.testing.assert_array_equal(getattr(state, name), getattr(before, name))

@@ -294,7 +294,7 @@ def test_open_ledger_of_the_loading_stops_the_run():
 @pytest.mark.parametrize(("controls", "cure"), [
     ({"explicit": ExplicitControls(courant=0.7)}, r"at t = 0 s, .*lower --courant \(now 0.7\)"),
     ({"integrator": "hht", "hht": HHTControls(dt=3e-7)}, r"at t = 0 s, .*lower --hht-dt \(now 3e-07 s\)"),
-    ({"analysis": "quasistatic"}, r"at sweep 0, .*raise --front \(now 0.8\), or compute with --analysis dynamic"),
+    ({"analysis": "quasistatic"}, r"at pass 0, .*raise --front \(now 0.8\), or compute with --analysis dynamic"),
 ])
 def test_cure_is_that_of_the_method(controls: dict[str, Any], cure: str):
     """Fails if an error tells to change an option of another method."""

@@ -31,7 +31,7 @@ from skfsink.methods.controls import HHTControls
 from skfsink.methods.rest import LoadingFromRest
 from skfsink.run import model as models
 from skfsink.run.display import Display
-from skfsink.run.model import LADDERS, REFERENCE, Ladder, choose_model, rung
+from skfsink.run.model import LADDERS, REFERENCE, Ladder, choose_model, level
 from skfsink.run.quantities import relative_error
 from skfsink.run.simulate import Simulation
 from skfsink.scene.options import QUANTITIES, Options
@@ -225,10 +225,10 @@ def test_a_start_from_rest_needs_a_grip_that_moves(tmp_path: Path) -> None:
 # --- the ladder ---
 @pytest.mark.parametrize("case", LADDERS)
 def test_every_rung_is_a_set_of_options(case: str) -> None:
-    """Fails if two rungs are the same, or a name has a word that means nothing."""
+    """Fails if two levels are the same, or a name has a word that means nothing."""
     made = []
     for name in LADDERS[case]:
-        model = rung(case, name)
+        model = level(case, name)
         words = {word for word in models.VARIANTS if f"-{word}-" in f"-{name}-"}
         assert len(model.title.split("; ")) == 1 + len(words)
         assert name == "-".join([name.split("-")[0], *(word for word in models.VARIANTS if word in words)])
@@ -236,17 +236,17 @@ def test_every_rung_is_a_set_of_options(case: str) -> None:
         assert made[-1].model == name
     assert len({tuple(options.parameters().items()) for options in made}) == len(made)
     with pytest.raises(ParameterError, match=r"model must be auto or one of onset, .*; got 'magic'"):
-        rung(case, "magic")
+        level(case, "magic")
 
 
 def test_options_against_the_model_are_refused() -> None:
     """Fails if an option that was asked for is silently replaced by the model's."""
-    model = rung("single_edge_notch", "statics-half")
+    model = level("single_edge_notch", "statics-half")
     assert model.apply(Options(analysis="quasistatic", phi=0.2)).half
     with pytest.raises(ParameterError, match="--analysis both is not that of the model statics-half"):
         model.apply(Options(analysis="both"))
     with pytest.raises(ParameterError, match="--active-zone True"):
-        rung("single_edge_notch", "dynamics-everywhere").apply(Options(given=frozenset({"active_zone"})))
+        level("single_edge_notch", "dynamics-everywhere").apply(Options(given=frozenset({"active_zone"})))
 
 
 def point(price: float, u: float | None, speed: float | None, made: bool = False, **more: Any) -> dict[str, Any]:
@@ -344,7 +344,7 @@ def test_the_choice_is_printed_and_stored(ladder: Path, tmp_path: Path, monkeypa
 
 @pytest.mark.parametrize("case", LADDERS)
 def test_the_committed_ladder_answers_every_question(case: str) -> None:
-    """Fails if a rung was not measured, or `--model auto` finds nothing for a quantity."""
+    """Fails if a level was not measured, or `--model auto` finds nothing for a quantity."""
     found = Ladder(case)
     assert set(found.points) == set(LADDERS[case])
     for quantity in QUANTITIES:

@@ -204,7 +204,7 @@ def test_factors_kept_from_an_increment_given_up_do_not_change_the_equilibrium()
 
 
 def test_points_wait_only_for_points_that_fail() -> None:
-    """Fails if points wait for one that failed long ago and still bears the greatest energy: sweeps never end."""
+    """Fails if points wait for one that failed long ago and still bears the greatest energy: passes never end."""
     ends = at_onset(box("quad", 6))
     statics, state = Statics(ends.momentum, ends.density, ends.free, ends.velocity, StaticsControls(front=0.95)), \
         ends.fresh()
@@ -383,7 +383,7 @@ def test_a_body_of_which_nothing_is_left_is_a_result(tmp_path: Path) -> None:
 def test_a_material_point_fails_everywhere_at_once(tmp_path: Path) -> None:
     """Fails if the curve of one element ends in an error, or is not beside the theory."""
     summary = run(tmp_path, (1, 1), (1.0, 1.0), 1.0, '"1e-3 mm/s"', "quasistatic")
-    assert summary["verdict"].startswith("failed everywhere at once, in sweep ")
+    assert summary["verdict"].startswith("failed everywhere at once, in pass ")
     assert abs(summary["material_point"]["difference"]) < 3e-3  # k/mu is 400 here, the theory incompressible
     assert summary["loading"]["greatest_load"] == pytest.approx(1.131, rel=1e-3)
     assert (tmp_path / "out" / "energies.png").exists()
@@ -391,8 +391,8 @@ def test_a_material_point_fails_everywhere_at_once(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("front", [0.95, 1.0])
-def test_sweeps_end_whatever_share_of_points_may_fail(front: float, tmp_path: Path) -> None:
-    """Fails if points wait for ever: this scene made 41,000 sweeps without any change."""
+def test_passes_end_whatever_share_of_points_may_fail(front: float, tmp_path: Path) -> None:
+    """Fails if points wait for ever: this scene made 41,000 passes without any change."""
     result = symmetric_double_edge_notch(mesh="coarse", options=Options(
         analysis="quasistatic", front=front, out=tmp_path / "out", quiet=True))
     assert result.summary["verdict"].startswith("cracked and separated")

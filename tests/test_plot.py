@@ -209,10 +209,10 @@ def test_ledger_picture(tmp_path: Path, suffix: str) -> None:
     assert [p.name for p in tmp_path.iterdir()] == [path.name]
 
 
-def test_curves_of_a_quasi_static_run_are_over_the_sweeps(tmp_path: Path) -> None:
+def test_curves_of_a_quasi_static_run_are_over_the_passes(tmp_path: Path) -> None:
     event, time, label, unit = plot._event(history(quasistatic=True))
     np.testing.assert_array_equal(time, np.arange(30))
-    assert (label, unit) == ("sweep", "N mm/mm") and set(event["phase"]) == {"event"}
+    assert (label, unit) == ("pass", "N mm/mm") and set(event["phase"]) == {"event"}
     ledger_picture(history(quasistatic=True), tmp_path / "ledger.png")
     tip_picture(history(quasistatic=True), tmp_path / "tip.png", "", np.nan, np.nan)
     assert pixels(tmp_path / "tip.png").std() > 10

@@ -266,7 +266,7 @@ def test_layers_in_series_have_the_same_stress(kind: str) -> None:
 def test_a_strip_cracks_in_its_weaker_half() -> None:
     """Fails if a half takes the other one's limiter: the onset is the greatest load of the weaker half alone.
 
-    It may not contract, so that all is uniform in a half but for some lengths l around the middle; the sweeps kill
+    It may not contract, so that all is uniform in a half but for some lengths l around the middle; the passes kill
     elements of that half only, and book each with its own psi_f.
     """
     space = Space(grid("quad", (2, 40), (0.1, 2.0)))

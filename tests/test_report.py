@@ -63,10 +63,10 @@ def test_loaded_results_are_those_in_the_files(folder: Path) -> None:
         assert (run.event["phase"] == "event").all()
         assert len(run.deletions.element) == run.summary["deleted_elements"] == len(set(run.deletions.element))
         assert (np.diff(run.deletions.time) >= 0).all()
-        clock, last = ("s", run.event["time_s"][-1]) if run.analysis == "dynamic" else ("sweep", run.event["step"][-1])
+        clock, last = ("s", run.event["time_s"][-1]) if run.analysis == "dynamic" else ("pass", run.event["step"][-1])
         assert run.clock == clock and 0 < run.deletions.time[-1] <= last == run.frames.times[-1]
         log = (run.folder / "deletions.csv").read_text()
-        assert log.splitlines()[0] == ("time_s,element" if clock == "s" else "sweep,element")
+        assert log.splitlines()[0] == ("time_s,element" if clock == "s" else "pass,element")
         assert run.summary["units"] == {"load": "N/mm", "energy": "N mm/mm"}
         crushed = run.frames.frame("end").cell_data["crushed"][0]
         np.testing.assert_array_equal(crushed == 1, np.isnan(run.frames.frame("end").cell_data["von_mises"][0]))

@@ -43,11 +43,11 @@ def test_ledger_closes(both: Result, hht: Result) -> None:
 
 @pytest.mark.slow
 def test_dynamic_dissipates_more_and_quasistatic_runs_straight(both: Result) -> None:
-    """Fails if inertia is lost (the two would agree), or if the static sweeps let damage spread sideways."""
+    """Fails if inertia is lost (the two would agree), or if the static passes let damage spread sideways."""
     dynamic, quasistatic = both.parts["dynamic"].summary, both.parts["quasistatic"].summary
     assert dynamic["event"]["separated"] and quasistatic["event"]["separated"]
     assert dynamic["energy"]["U_paper_at_arrival"] > 1.1 * quasistatic["energy"]["U_paper_at_arrival"]
-    # D, unlike U, hardly differs: half of the dynamic one is taken from motion, and sweeps kill points far past Phi
+    # D, unlike U, hardly differs: half of the dynamic one is taken from motion, and passes kill points far past Phi
     assert dynamic["energy"]["D_sink_final"] == pytest.approx(quasistatic["energy"]["D_sink_final"], rel=0.15)
     assert dynamic["energy"]["D_sink_kinetic"] > 0.15 * dynamic["energy"]["D_sink_final"]
     assert quasistatic["event"]["max_branches"] == 1

@@ -168,7 +168,7 @@ def test_loading_resumes_to_the_same_bits():
 
 @pytest.mark.parametrize("n", [9, 15])
 def test_quasi_static_crack_runs_straight_and_the_ledger_closes(n: int):
-    """Fails if a sweep loses energy: released + D make up what was stored, and the crack cuts the plate."""
+    """Fails if a pass loses energy: released + D make up what was stored, and the crack cuts the plate."""
     body = loaded(n)
     state, statics, space = body.state, body.statics, body.statics.space
     state.u *= 1.005
@@ -195,7 +195,7 @@ def test_quasi_static_crack_runs_straight_and_the_ledger_closes(n: int):
 
 
 def test_arrested_crack_is_driven_on_by_the_grips():
-    """Fails if a body below its onset is not settled, or the next sweep does not move the grips and book their work."""
+    """Fails if a body below its onset is not settled, or the next pass does not move the grips and book their work."""
     body = loaded()
     state, statics = body.state, body.statics
     state.u *= 0.9
@@ -224,7 +224,7 @@ def test_controls_out_of_range_are_refused(name: str, value: float):
 
 
 def test_points_wait_while_one_is_much_further_past_the_limit(fracture: Fracture) -> None:
-    """Fails if a sweep kills all past Phi at once, forgets who waits, or lets a spent point hold up the rest."""
+    """Fails if a pass kills all past Phi at once, forgets who waits, or lets a spent point hold up the rest."""
     momentum, density = fracture.momentum, fracture.density
     state = fracture.fresh()
     momentum.set_gamma(state.gamma, state.deleted)
@@ -260,8 +260,8 @@ def test_bent_strip_snaps_back(kind: str):
     assert statics.newton_steps <= 150 and statics.factorisations <= 180
 
 
-def test_sweeps_resume_to_the_same_bits():
-    """Fails if a checkpoint of the sweeps misses what the factors that are kept were made from."""
+def test_passes_resume_to_the_same_bits():
+    """Fails if a checkpoint of the passes misses what the factors that are kept were made from."""
     bodies = [loaded(), loaded()]
     for body in bodies:
         body.state.u *= 1.005

@@ -71,7 +71,7 @@ def _row(run: Run) -> str:
     onset, event, energy = s["onset"], s["event"], s["energy"]
     time, speed = event["first_arrival_s"], event["mean_tip_speed_m_per_s"]
     if run.analysis == "quasistatic":
-        arrival, motion = f"sweep {event['first_arrival_sweep']:.0f}", "–"
+        arrival, motion = f"pass {event['first_arrival_pass']:.0f}", "–"
     else:
         arrival, motion = f"{time * 1e6:.0f} µs", f"{speed:.1f}"
     return (f"| {run.folder.name} | {s['elements']:,} | {onset['displacement_mm']:.3f} | "

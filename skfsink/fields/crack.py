@@ -9,11 +9,11 @@ branches     The cracked set is cut into strips of width l by the graph distance
              neighbouring strips that touch are linked; pieces with nothing beyond them are ends. Ends nearer than
              2.5 l to the fork they come from are roughness of the crack's face, not branches. What is left counts.
 tip          the farthest node of an end. It is active while it is younger than 5 l/c_s, arrested after that; in a
-             quasi-static run, whose clock counts sweeps and no seconds, while it is younger than 10 sweeps.
+             quasi-static run, whose clock counts passes and no seconds, while it is younger than 10 passes.
 leading tip  the tip farthest, in a straight line, from the middle of its origin; that distance is the crack length.
-tip speed    slope of the line fitted by least squares to the crack length over the last 4 l/c_s; 0 in sweeps.
+tip speed    slope of the line fitted by least squares to the crack length over the last 4 l/c_s; 0 in passes.
 mean speed   crack length gained between its first passing l and the first arrival, over the time that took; none in
-             sweeps.
+             passes.
 first arrival  a connected piece of the cracked set touches the rim of the sample at two places, more than 3 l apart:
              the crack has reached an edge, a grip or another notch, or has met the crack that came from there. The
              rim is the outer boundary, in three dimensions without the surfaces along which a crack runs; a place is
@@ -39,7 +39,7 @@ from ..fem.space import Space
 __all__ = ["CRACKED", "CrackTracker", "Plane", "Tips"]
 
 CRACKED = 0.1
-ADVANCES = 10   # sweeps within which a tip that advances has cracked a node
+ADVANCES = 10   # passes within which a tip that advances has cracked a node
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class CrackTracker:
     Parameters
     ----------
     space: the spaces.
-    length_scale: l [mm].   shear_wave_speed: c_s [m/s]; None if times are numbers of sweeps.
+    length_scale: l [mm].   shear_wave_speed: c_s [m/s]; None if times are numbers of passes.
     grips: node numbers of each grip.
     rim: node numbers of the rim.
     planes: of symmetry.
@@ -86,17 +86,17 @@ class CrackTracker:
     def __init__(self, space: Space, length_scale: float, shear_wave_speed: float | None, grips: list[np.ndarray],
                  rim: np.ndarray, planes: Sequence[Plane] = ()) -> None:
         self.space, self.l = space, length_scale
-        #: l/c_s [s]; None if the clock counts sweeps
+        #: l/c_s [s]; None if the clock counts passes
         self._transit = None if shear_wave_speed is None else length_scale / (shear_wave_speed * 1e3)
         self._grips, self._rim, self._planes = grips, rim, planes
         rows = np.repeat(np.arange(space.n_nodes), np.diff(space.graph.indptr))
         lengths = np.linalg.norm(space.X[rows] - space.X[space.graph.indices], axis=1)
         self._graph = csr_array((np.maximum(lengths, 1e-12), space.graph.indices, space.graph.indptr),
                                 shape=space.graph.shape)
-        self.cracked_at = np.full(space.n_nodes, np.inf)   #: time at which each node cracked [s, or sweep]
+        self.cracked_at = np.full(space.n_nodes, np.inf)   #: time at which each node cracked [s, or pass]
         self.origin = np.full(space.n_nodes, -1)           #: number of the origin a node belongs to, -1 for none
         self.track: list[tuple[float, float]] = []         #: (time, crack length) of the records
-        self.arrival: float | None = None                  #: time of the first arrival [s, or sweep]
+        self.arrival: float | None = None                  #: time of the first arrival [s, or pass]
         self.arrival_length = np.nan
         self.max_branches = 0
         self.separated = False
@@ -171,7 +171,7 @@ class CrackTracker:
 
     def mean_speed(self) -> float | None:
         """Mean speed of the leading tip up to the first arrival, or to the last record before any [m/s]; None where
-        there is none, as in sweeps."""
+        there is none, as in passes."""
         if self._transit is None:
             return None
         track = np.array(self.track)

@@ -25,8 +25,8 @@ class State:
     deleted: failed elements, (ne,) bool.
     deletions: the ordered log (time, element), with `time` as below.
     grip: displacement of the grips along their velocity, as a time at that velocity [s] (the load clock).
-    time: time since the start of the phase [s]; in a quasi-static event the number of the sweep.
-    step: steps taken in the phase (load increments, sweeps, time steps).
+    time: time since the start of the phase [s]; in a quasi-static event the number of the pass.
+    step: steps taken in the phase (load increments, passes, time steps).
     phase: "loading", "event" or "done".
     ledger: energies of the phase.
     """

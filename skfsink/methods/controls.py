@@ -104,7 +104,7 @@ class StaticsControls:
     ----------
     tolerance: residual force at which equilibrium is reached, relative to the forces inside, in (0, 0.01].
     gamma_tolerance: change of gamma in a pass at which the coupled fields are converged, in (0, 0.01].
-    front: a sweep fails the points whose stored energy is at least this share of the greatest one, in [0, 1]; 0 fails
+    front: a pass fails the points whose stored energy is at least this share of the greatest one, in [0, 1]; 0 fails
         all that are past the energy limiter at once.
     increment: first (and largest) load increment, as displacement of a grip over the size of the body, or as change of
         a traction over twice the shear modulus, in (0, 0.5].

@@ -22,23 +22,23 @@ __all__ = ["Statics"]
 class Statics(StaticLoading):
     """Equilibria of a body between grips: loading as of :class:`.StaticLoading`, then a crack through equilibria.
 
-    Memory: that of :class:`.StaticLoading`, and whether the last sweep `settled`; `propagate` goes on from there,
+    Memory: that of :class:`.StaticLoading`, and whether the last pass `settled`; `propagate` goes on from there,
     `memory` gives both.
     """
 
-    SNAP = 400  # Newton steps in a sweep: the body may snap to a shape far away
+    SNAP = 400  # Newton steps in a pass: the body may snap to a shape far away
 
-    IDLE = 100  # sweeps that change nothing while points wait, after which a run is given up
+    IDLE = 100  # passes that change nothing while points wait, after which a run is given up
 
-    settled = False  #: whether the last sweep of `propagate` found nothing left to change
+    settled = False  #: whether the last pass of `propagate` found nothing left to change
     arrested = ""    #: why `propagate` has ended although the caller would have gone on; empty while it has not
 
     def propagate(self, state: State, advance: float = 0.005, limit: float = 10.0) -> Iterator[State]:
-        """Let the crack run through equilibria, yielding after each sweep; the caller stops when it has crossed.
+        """Let the crack run through equilibria, yielding after each pass; the caller stops when it has crossed.
 
-        A sweep: equilibrium at fixed gamma (the energy it gives up is `released`), then the history, gamma and the
+        A pass: equilibrium at fixed gamma (the energy it gives up is `released`), then the history, gamma and the
         deletions at fixed displacement (what they take is D). Grips and dead loads stand still while the crack runs;
-        where it arrests, `settled` is set, and the next sweep moves them on by `advance` of their way so far. It ends
+        where it arrests, `settled` is set, and the next pass moves them on by `advance` of their way so far. It ends
         where the crack has not crossed at `limit` times the way of the start, or when nothing moves any more; then
         `arrested` says which.
 
@@ -90,19 +90,19 @@ class Statics(StaticLoading):
             self.settled = change <= self.controls.gamma_tolerance and not postponed
             idle = idle + 1 if postponed and change <= self.controls.gamma_tolerance else 0
             if idle > self.IDLE:
-                raise ConvergenceError(f"the last {idle} sweeps have changed nothing, while points past the energy "
+                raise ConvergenceError(f"the last {idle} passes have changed nothing, while points past the energy "
                                        f"limiter wait for others: lower --front (now {self.controls.front:g})")
             yield state
 
     def _relax(self, state: State) -> np.ndarray:
-        """The equilibrium of a sweep; the history follows equilibria only, or the sink would kill the mesh."""
+        """The equilibrium of a pass; the history follows equilibria only, or the sink would kill the mesh."""
         try:
             return self.newton.equilibrium(state.u, most=self.SNAP)[0]
         except ConvergenceError as error:
             cure = "take another mesh, or --analysis dynamic"
             if self.momentum.dead is not None:
                 cure = "a body that tractions tear has none; take --analysis dynamic, or move a grip instead"
-            raise ConvergenceError(f"sweep {state.step + 1}: {error}; the history follows equilibria only: "
+            raise ConvergenceError(f"pass {state.step + 1}: {error}; the history follows equilibria only: "
                                    f"{cure}") from None
 
     def _follow(self, state: State, W: np.ndarray) -> bool:

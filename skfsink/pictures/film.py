@@ -91,7 +91,7 @@ def _frames(run: Run, numbers: Sequence[int]) -> list[Frame]:
     for number in numbers:
         time = float(run.frames.times[number])
         run.frames.frame(number)  # says in one line what is missing
-        label = f"sweep {time:.0f}" if quasistatic else ""
+        label = f"pass {time:.0f}" if quasistatic else ""
         found.append(read_frame(run.folder / "series" / frame_file("run", number), np.nan if quasistatic else time,
                                 label, 3))
     return found

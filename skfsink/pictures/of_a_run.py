@@ -73,7 +73,7 @@ def _draw_loading(scene: Scene, folder: Path) -> None:
 def _frame(folder: Path, number: int, time: float, word: str, scene: Scene) -> Frame:
     quasistatic = scene.controls.analysis == "quasistatic"
     if quasistatic:
-        word = ", ".join(filter(None, [word, f"sweep {time:.0f}"]))
+        word = ", ".join(filter(None, [word, f"pass {time:.0f}"]))
     return read_frame(folder / "series" / frame_file("run", number), np.nan if quasistatic else time, word,
                       scene.sample.space.dim)
 

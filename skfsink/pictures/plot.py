@@ -200,7 +200,7 @@ def _event(history: History) -> tuple[dict[str, np.ndarray], np.ndarray, str, st
     unit = history_units(3 if in_space else 2)["elastic"]
     if np.ptp(event["time_s"]) > 0:
         return event, event["time_s"] * 1e6, "time since onset (µs)", unit
-    return event, event["step"].astype(float), "sweep", unit
+    return event, event["step"].astype(float), "pass", unit
 
 
 @matplotlib.rc_context(STYLE)

@@ -118,7 +118,7 @@ def key_table(runs: Sequence[Run], labels: Sequence[str], waves: Sequence[tuple[
         row("elastic energy at the onset", energy, "onset", "elastic_energy"),
         _row("where it begins to fail", "", [_beginning(run) for run in runs]),
         row("first arrival of the crack at an edge", "µs", "event", "first_arrival_s", factor=1e6),
-        row("first arrival of the crack at an edge", "sweep", "event", "first_arrival_sweep"),
+        row("first arrival of the crack at an edge", "pass", "event", "first_arrival_pass"),
         _row("mean speed of the tip up to there", "m/s", mean),
         _row("mean speed over c_R", "", [_share(w, v, 1) for w, v in zip(waves, mean)]),
         _row("greatest speed of the tip", "m/s", fastest),
@@ -161,7 +161,7 @@ def cost_table(runs: Sequence[Run], labels: Sequence[str]) -> Table:
     phases = list(dict.fromkeys(phase for wall in walls for phase in wall))
     rows = [_row(f"wall time, {phase}", "s", [wall.get(phase) for wall in walls]) for phase in phases]
     rows.append(_row("wall time, in all", "s", [sum(wall.values()) if wall else None for wall in walls]))
-    rows += [row("steps or sweeps", "", "cost", "steps"), row("solves for γ", "", "cost", "gamma_solves"),
+    rows += [row("steps or passes", "", "cost", "steps"), row("solves for γ", "", "cost", "gamma_solves"),
              row("factorisations", "", "cost", "factorisations"), row("peak memory", "MB", "cost", "peak_rss_mb"),
              row("elements", "", "elements"), row("unknowns, displacement", "", "unknowns", "displacement"),
              row("unknowns, density", "", "unknowns", "density"),

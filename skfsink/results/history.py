@@ -20,8 +20,8 @@ __all__ = ["HISTORY_COLUMNS", "History", "Table", "deletions_header", "history_h
 #: Columns of a history, in order, with their meaning. Energies are those of :class:`.energy.Ledger`.
 HISTORY_COLUMNS: dict[str, str] = {
     "phase": "phase of the run",
-    "step": "load increments, sweeps or time steps taken in the phase",
-    "time_s": "time since the start of the phase; 0 in sweeps, which have none",
+    "step": "load increments, passes or time steps taken in the phase",
+    "time_s": "time since the start of the phase; 0 in passes, which have none",
     "grip_displacement_mm": "displacement of a grip",
     "reaction_N_per_mm": "force on a grip along its motion",
     "elastic": "gamma-weighted stored energy",
@@ -84,8 +84,8 @@ def onset_load(onset: Mapping[str, Any]) -> Any:
 
 
 def deletions_header(clock: str) -> list[str]:
-    """Columns of `deletions.csv` of an event whose clock counts "s" or "sweep"."""
-    return ["time_s" if clock == "s" else "sweep", "element"]
+    """Columns of `deletions.csv` of an event whose clock counts "s" or "pass"."""
+    return ["time_s" if clock == "s" else "pass", "element"]
 
 
 class Table(dict[str, np.ndarray]):

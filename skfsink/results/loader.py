@@ -73,7 +73,7 @@ class Frames(Sequence[meshio.Mesh]):
 
     Attributes
     ----------
-    times: of the frames, in :attr:`Run.clock`: [s], or numbers of sweeps; load times [s] in a run that did not fail.
+    times: of the frames, in :attr:`Run.clock`: [s], or numbers of passes; load times [s] in a run that did not fail.
     name: "run", or "loading" for the frames of the loading.
     moments: frame number of onset, branching, arrival and end, as far as they happened.
     units: of the fields.
@@ -160,8 +160,8 @@ class Run:
 
     @property
     def clock(self) -> str:
-        """What times of frames and deletions count: "s", or "sweep" in a quasi-static run, which has no time."""
-        return "sweep" if self.analysis == "quasistatic" else "s"
+        """What times of frames and deletions count: "s", or "pass" in a quasi-static run, which has no time."""
+        return "pass" if self.analysis == "quasistatic" else "s"
 
     @property
     def warnings(self) -> list[str]:
@@ -204,7 +204,8 @@ class Run:
             text = path.read_text(encoding="utf-8", errors="replace")
         try:
             header, *rows = csv.reader(text.splitlines())
-            if header not in (deletions_header("s"), deletions_header("sweep")):  # "s" of sweeps too, formerly
+            formerly = ["sweep", "element"]
+            if header not in (deletions_header("s"), deletions_header("pass"), formerly):
                 raise ValueError
             return Deletions(np.array([float(time) for time, _ in rows]), np.array([int(e) for _, e in rows], int))
         except ValueError:
@@ -226,11 +227,11 @@ class Run:
 
     def _arrival_row(self) -> int | None:
         arrival, event = self.summary.get("event", {}), self.event
-        time, sweep = arrival.get("first_arrival_s"), arrival.get("first_arrival_sweep")
-        if time is None and sweep is None:
+        time, number = arrival.get("first_arrival_s"), arrival.get("first_arrival_pass")
+        if time is None and number is None:
             return None
         clock = event["time_s"] if time is not None else event["step"].astype(float)
-        return int(np.argmin(np.abs(clock - (time if time is not None else sweep))))
+        return int(np.argmin(np.abs(clock - (time if time is not None else number))))
 
     def _own(self, name: str) -> Path:
         if self.analysis == "both":

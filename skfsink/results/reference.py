@@ -90,9 +90,9 @@ def pick_frame(phrase: str, moments: dict[str, int], times: Sequence[float],
     Parameters
     ----------
     phrase: a moment of the run ("onset", "branching", "arrival", "end"); a moment and a time after it
-        ("arrival + 5e-6", seconds, or sweeps of a quasi-static run); "growing", when the crack first has half of its
+        ("arrival + 5e-6", seconds, or passes of a quasi-static run); "growing", when the crack first has half of its
         final length, or another share of it ("growing * 0.3").
-    moments: frame numbers by moment.   times: of the frames [s], or sweeps.
+    moments: frame numbers by moment.   times: of the frames [s], or passes.
     event: columns of the history of the event.
 
     Raises

@@ -127,7 +127,7 @@ class Series:
 
 
 def frame_times(path: Path) -> list[float]:
-    """Times of the frames that a PVD file names [s], or sweeps; OutputError if it is not there, or damaged."""
+    """Times of the frames that a PVD file names [s], or passes; OutputError if it is not there, or damaged."""
     try:
         return [float(entry.attrib["timestep"]) for entry in ET.parse(path).iter("DataSet")]
     except (OSError, ET.ParseError, KeyError, ValueError):

@@ -34,11 +34,20 @@ def read_summary(folder: Path, name: str = SUMMARY) -> dict[str, Any]:
         summary = json.loads(path.read_text(encoding="utf-8"))
         if not isinstance(summary, dict) or "case" not in summary:
             raise ValueError("no summary")
-        return summary
+        return _as_now(summary)
     except FileNotFoundError:
         raise OutputError(f"{path.parent} holds no finished run: there is no {path.name}") from None
     except (OSError, ValueError) as error:
         raise OutputError(f"{path} is damaged: {error}") from None
+
+
+def _as_now(summary: dict[str, Any]) -> dict[str, Any]:
+    """A summary of schema 1 or 2 under the names of schema 3, where these have changed."""
+    for part in (summary, *(summary[name] for name in ("dynamic", "quasistatic") if name in summary)):
+        event = part.get("event", {})
+        if "first_arrival_sweep" in event:
+            event["first_arrival_pass"] = event.pop("first_arrival_sweep")
+    return summary
 
 
 def _plain(value: Any, name: str) -> Any:

@@ -297,7 +297,7 @@ class Guard:
 
     def _when(self, state: State) -> str:
         if self.scene.controls.analysis == "quasistatic" and state.phase == "event":
-            return f"sweep {state.step}"
+            return f"pass {state.step}"
         return f"t = {state.time:.4g} s"
 
 

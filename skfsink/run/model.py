@@ -1,10 +1,10 @@
-"""The ladder of models of each scene, and the choice of a rung from what it was measured to cost and to miss.
+"""The ladder of models of each scene, and the choice of a level from what it was measured to cost and to miss.
 
-A rung is a set of option values with a name: what is analysed (`onset`: statics up to the onset, `statics`: a
+A level is a set of option values with a name: what is analysed (`onset`: statics up to the onset, `statics`: a
 quasi-static crack, `dynamics`: statics to the onset and a dynamic event, `full`: dynamics from the unloaded body on),
 and what stands for the body (`half`, `slab`, `plane-stress`), for the mesh (`uniform`, `two-pass`) and for the density
-solve (`everywhere`). `python -m skfsink.study.ladder` runs the rungs and keeps, for each, the figures of
-:mod:`.quantities` and the wall time in `cases/<case>/ladder.json`. Errors are relative to the reference rung.
+solve (`everywhere`). `python -m skfsink.study.ladder` runs the levels and keeps, for each, the figures of
+:mod:`.quantities` and the wall time in `cases/<case>/ladder.json`. Errors are relative to the reference level.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from ..scene.options import Options
 from ..system.shipped import data_folder
 from .quantities import PATH, relative_error
 
-__all__ = ["AUTO", "LADDERS", "REFERENCE", "SCATTER", "Ladder", "choose_model", "ladder_path", "rung"]
+__all__ = ["AUTO", "LADDERS", "REFERENCE", "SCATTER", "Ladder", "choose_model", "ladder_path", "level"]
 
 AUTO, REFERENCE = "auto", "full"
-SCATTER = "dynamics, another mesh"  # in the file of a ladder, but no rung
+SCATTER = "dynamics, another mesh"  # in the file of a ladder, but no level
 RULED: dict[str, Any] = {"analysis": "dynamic", "integrator": "explicit", "start": "onset", "half": False,
                          "dimensions": 0, "mesh_layout": "corridor", "active_zone": True}
 ANALYSES: dict[str, tuple[dict[str, Any], str]] = {
@@ -45,7 +45,7 @@ _COMMON = ("onset", "statics", "dynamics", "full", "dynamics-everywhere", "dynam
            "dynamics-two-pass")
 _HALVES = ("onset-half", "statics-half", "dynamics-half", "dynamics-half-two-pass")
 _SHEETS = ("onset-plane-stress", "statics-plane-stress", "dynamics-plane-stress", "dynamics-half-plane-stress")
-#: names of the rungs of each case
+#: names of the levels of each case
 LADDERS: dict[str, tuple[str, ...]] = {
     "single_edge_notch": (*_COMMON, *_HALVES, "dynamics-slab"),
     "simple_shear": (*_COMMON, "dynamics-slab"),
@@ -57,7 +57,7 @@ LADDERS: dict[str, tuple[str, ...]] = {
 
 
 @dataclass(frozen=True)
-class Rung:
+class Level:
     """A model: its name, what it is in words, and the options it sets."""
 
     name: str
@@ -65,7 +65,7 @@ class Rung:
     options: Mapping[str, Any]
 
     def apply(self, options: Options) -> Options:
-        """The options with those of the rung.
+        """The options with those of the level.
 
         Raises
         ------
@@ -82,8 +82,8 @@ class Rung:
         return replace(options, **values, model=self.name)
 
 
-def rung(case: str, name: str) -> Rung:
-    """The rung of a case by name; ParameterError says which there are."""
+def level(case: str, name: str) -> Level:
+    """The level of a case by name; ParameterError says which there are."""
     if name not in LADDERS[case]:
         raise ParameterError(f"model must be {AUTO} or one of {', '.join(LADDERS[case])}; got {name!r}")
     base, _, rest = name.partition("-")
@@ -92,7 +92,7 @@ def rung(case: str, name: str) -> Rung:
         if f"-{word}-" in f"-{rest}-":
             parts.append(part)
     values = {key: value for part in parts for key, value in part[0].items()}
-    return Rung(name, "; ".join(part[1] for part in parts), values)
+    return Level(name, "; ".join(part[1] for part in parts), values)
 
 
 def ladder_path(case: str) -> Path:
@@ -105,7 +105,7 @@ class Ladder:
 
     Attributes
     ----------
-    points: by rung, with `quantities`, `crack`, `price_s`, or `failed`.   mesh: that it was measured on.
+    points: by level, with `quantities`, `crack`, `price_s`, or `failed`.   mesh: that it was measured on.
     processor: of the machine it was measured on.
 
     Raises
@@ -130,7 +130,7 @@ class Ladder:
             raise OutputError(f"{path} is no measured ladder: {error}") from None
 
     def error(self, name: str, quantity: str) -> float | None:
-        """Relative error of a rung; None if it gives no such quantity, or failed."""
+        """Relative error of a level; None if it gives no such quantity, or failed."""
         value, reference = (self._value(self.points.get(key, {}), quantity) for key in (name, REFERENCE))
         return relative_error(quantity, value, reference)
 
@@ -144,11 +144,11 @@ class Ladder:
         return point.get("crack") if quantity == PATH else point.get("quantities", {}).get(quantity)
 
     def by_price(self) -> list[str]:
-        """Names of the rungs that did not fail, the cheapest first."""
+        """Names of the levels that did not fail, the cheapest first."""
         return sorted((k for k, p in self.points.items() if "failed" not in p), key=lambda k: self.points[k]["price_s"])
 
     def cheapest(self, quantity: str, tolerance: float, gmsh: bool) -> tuple[str, str, str]:
-        """The cheapest rung within `tolerance`, the next cheaper one, and why that was refused ("" if there is none).
+        """The cheapest level within `tolerance`, the next cheaper one, and why that was refused ("" if there is none).
 
         Raises
         ------
@@ -187,7 +187,7 @@ def choose_model(case: str, own: Mapping[str, Any], defaults: Mapping[str, Any],
     if options.model == AUTO:
         assert ladder is not None
         name, cheaper, why = ladder.cheapest(options.quantity, options.tolerance, has_gmsh())
-    model = rung(case, name)
+    model = level(case, name)
     choice: dict[str, Any] = {"model": name, "asked": options.model, "title": model.title, "quantity": options.quantity}
     text = [f"model {name} ({model.title})"]
     if options.model == AUTO:

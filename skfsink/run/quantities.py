@@ -37,7 +37,7 @@ def measured(scene: Scene, recorder: Recorder) -> dict[str, float | None]:
 def crack_cells(scene: Scene, state: State, until: float | None) -> list[list[int]]:
     """The crack at the first arrival: squares of side l of the section in which elements had failed, ascending.
 
-    `until` is the time (quasi-static: sweep) of the arrival; None takes all.
+    `until` is the time (quasi-static: pass) of the arrival; None takes all.
     """
     space = scene.sample.space
     failed = [element for time, element in state.deletions if until is None or time <= until]

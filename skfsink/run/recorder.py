@@ -53,7 +53,7 @@ class Recorder:
         names = [*(grip.boundary for grip in scene.grips), *(traction.boundary for traction in scene.tractions)]
         held = [sample.nodes(name) for name in dict.fromkeys(names)]
         # a tip in the slowest material has to have moved between two looks at it
-        self.clock = "sweep" if scene.controls.analysis == "quasistatic" else "s"   #: unit of the time of the event
+        self.clock = "pass" if scene.controls.analysis == "quasistatic" else "s"   #: unit of the time of the event
         self.tracker = CrackTracker(space, scene.sink_law.length_scale,
                                     momentum.shear_wave_speeds[0] if self.clock == "s" else None, held,
                                     *rim_of(scene))
@@ -72,7 +72,7 @@ class Recorder:
         self.moments: dict[str, int] = dict(memory["moments"])
         self.onset: dict[str, Any] = dict(memory["onset"])
         self.at_arrival: dict[str, float] = dict(memory["at_arrival"])
-        self.separated_at = float(memory.get("separated_at", np.inf))   #: record of the separation [s, or sweep]
+        self.separated_at = float(memory.get("separated_at", np.inf))   #: record of the separation [s, or pass]
         self.series.resume(len(self.frames))  # this may refuse, before any file is touched
         self.loading_series.resume(len(self.loading_frames))
         self.history = History(folder / "history.csv", memory["rows"], space.dim)
@@ -178,7 +178,7 @@ class Recorder:
     def _close(self, state: State) -> None:
         self.series.flush()
         self.loading_series.flush()
-        log = "".join(f"{int(time) if self.clock == 'sweep' else time!r},{element}\n"
+        log = "".join(f"{int(time) if self.clock == 'pass' else time!r},{element}\n"
                       for time, element in state.deletions)
         write_atomic(self.history.path.with_name("deletions.csv"), ",".join(deletions_header(self.clock)) + "\n" + log)
 

@@ -232,7 +232,7 @@ class Simulation:
         for _ in self.statics.propagate(state):
             self.counts["steps"] += 1
             if recorder.watch(state, self.momentum.force(state.u), before, 0.0):
-                self._show(state, 0.0, f"sweep {state.step}")
+                self._show(state, 0.0, f"pass {state.step}")
             before = state.time
             at_rest = self.statics.settled or state.ledger.elastic < 1e-4 * scale
             if self.dissolved or (recorder.tracker.separated and at_rest):

@@ -1,4 +1,4 @@
-"""The summary of a finished run (schema version 2)."""
+"""The summary of a finished run (schema version 3)."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .verdict import verdict
 
 __all__ = ["SCHEMA", "peak_rss_mb", "summarize"]
 
-SCHEMA = 2   # 1 had "reaction_N_per_mm" for the force [N] on bodies in space, and no "units"
+SCHEMA = 3   # 2 counted "sweeps"; 1 had "reaction_N_per_mm" for forces [N] on bodies in space, and no "units"
 
 
 def peak_rss_mb() -> float:
@@ -53,7 +53,7 @@ def summarize(scene: Scene, simulation: Simulation) -> dict[str, Any]:
                   load_name(space.dim): onset.get("reaction_N_per_mm"),
                   **{k: onset.get(k) for k in ("elastic_energy", "gamma_min", "place_mm", "boundary")}},
         "event": {"first_arrival_s": tracker.arrival if dynamic else None,
-                  "first_arrival_sweep": None if dynamic else tracker.arrival,
+                  "first_arrival_pass": None if dynamic else tracker.arrival,
                   "mean_tip_speed_m_per_s": tracker.mean_speed() if dynamic else None,
                   "max_branches": tracker.max_branches, "separated": tracker.separated,
                   "duration_s": state.time if dynamic and onset else None},

@@ -47,5 +47,5 @@ def verdict(scene: Scene, simulation: Simulation) -> str:
 
 
 def _when(scene: Scene, clock: float) -> str:
-    """A time of the event, or a sweep."""
-    return f"in sweep {clock:.0f}" if scene.controls.analysis == "quasistatic" else f"at {clock * 1e6:.4g} µs"
+    """A time of the event, or a pass."""
+    return f"in pass {clock:.0f}" if scene.controls.analysis == "quasistatic" else f"at {clock * 1e6:.4g} µs"

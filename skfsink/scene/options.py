@@ -116,7 +116,7 @@ class Options:
     integrator
         Of the dynamic event: "explicit" or "hht".
     front
-        Quasi-static: a sweep fails the points with at least this share of the greatest stored energy, in [0, 1].
+        Quasi-static: a pass fails the points with at least this share of the greatest stored energy, in [0, 1].
     element
         "jbar" (element-constant J̄), "plain" (standard Q1, locks) or "planestress" (thin sheet with free faces, in 2D).
     event_time

@@ -1,6 +1,6 @@
 """The ladder of models of each scene, measured: `python -m skfsink.study.ladder` writes `cases/<case>/ladder.json`.
 
-Every rung of :data:`.models.LADDERS` is run once, on one core; it goes on where it was stopped. A further run on
+Every level of :data:`.models.LADDERS` is run once, on one core; it goes on where it was stopped. A further run on
 another mesh of the same sizes tells how much of an error may be that of the mesh.
 """
 
@@ -25,7 +25,7 @@ from cyclopts import Parameter
 
 from ..errors import ParameterError
 from ..run.display import Display
-from ..run.model import LADDERS, SCATTER, Ladder, ladder_path, rung
+from ..run.model import LADDERS, SCATTER, Ladder, ladder_path, level
 from ..run.quantities import crack_cells, measured
 from ..run.simulate import Simulation
 from ..run.two_pass import corridor_report, lay_corridor
@@ -90,13 +90,13 @@ def scene_of(case: str, options: Options, mesh: str, **dimensions: Any) -> tuple
 
 
 def measure(case: str, name: str, mesh: str = "", base: Options = Options()) -> dict[str, Any]:  # noqa: B008
-    """Run a rung without drawing: its figures for the whole sample, its crack, and its price in processor time [s].
+    """Run a level without drawing: its figures for the whole sample, its crack, and its price in processor time [s].
 
     `mesh` is that of :data:`MESHES` by default; `base` holds the other options.
     """
     mesh = mesh or MESHES[case]
     seed = {"mesh_seed": 1} if name == SCATTER else {}
-    options = rung(case, "dynamics" if seed else name).apply(base)
+    options = level(case, "dynamics" if seed else name).apply(base)
     with tempfile.TemporaryDirectory() as temporary, Display(quiet=True) as display:
         folder, start, cpu = Path(temporary), time.perf_counter(), time.process_time()
         scene, own = scene_of(case, options, mesh, **seed)

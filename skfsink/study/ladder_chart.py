@@ -84,7 +84,7 @@ def _label(ax: Axes, shown: list[tuple[tuple[float, float], str, str]]) -> None:
 
 
 def errors_table(ladder: Ladder) -> str:
-    """Price and errors of the rungs of a case, the cheapest first, as a table in Markdown."""
+    """Price and errors of the levels of a case, the cheapest first, as a table in Markdown."""
     lines = ["| model | elements | price (s) | " + " | ".join(QUANTITIES) + " |", "|---" * (3 + len(QUANTITIES)) + "|"]
     for name in ladder.by_price():
         point = ladder.points[name]

@@ -52,7 +52,7 @@ FAILURES = {
     "checkerboard": Failure(elements.plan_checkerboard, elements.draw_checkerboard, 2),
     "flat": Failure(elements.plan_flat, elements.draw_flat, 2),
     "deletion": Failure(time.plan_deletion, time.draw_deletion),
-    "sweeps": Failure(onset.plan_sweeps, onset.draw_sweeps),
+    "unconverged": Failure(onset.plan_unconverged, onset.draw_unconverged),
     "notch": Failure(onset.plan_notch, onset.draw_notch),
     "length": Failure(onset.plan_length, onset.draw_length),
 }
@@ -60,7 +60,7 @@ FLAG = Parameter(negative="", show_default=False)
 
 
 def stability(*, only: Literal["explicit", "hht", "alpha", "staggering", "sink", "locking", "checkerboard", "flat",
-                               "deletion", "sweeps", "notch", "length"] | None = None,
+                               "deletion", "unconverged", "notch", "length"] | None = None,
               quick: Annotated[bool, FLAG] = False, fresh: Annotated[bool, FLAG] = False,
               out: Path = Path("results/study/stability"), quiet: Annotated[bool, FLAG] = False) -> None:
     """Find where the methods fail, and draw it.

@@ -1,4 +1,4 @@
-"""Where the onset and the crack depend on the iteration or the mesh: staggering, sweeps, notch, l/h."""
+"""Where the onset and the crack depend on the iteration or the mesh: staggering, unconverged passes, notch, l/h."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from .blocks import block
 from .body import SPEED, Body
 from .part import Planned, Points
 
-__all__ = ["draw_length", "draw_notch", "draw_staggering", "draw_sweeps", "length", "notch", "passes", "plan_length",
-           "plan_notch", "plan_staggering", "plan_sweeps", "staggering", "sweeps"]
+__all__ = ["draw_length", "draw_notch", "draw_staggering", "draw_unconverged", "length", "notch", "passes",
+           "plan_length", "plan_notch", "plan_staggering", "plan_unconverged", "staggering", "unconverged"]
 
 
 @cache
@@ -85,7 +85,7 @@ def draw_staggering(axes: Sequence[Axes], points: Points) -> None:
 
 
 # --- a history that follows states that are no equilibria ---
-def sweeps(increments: int, steps: int, share: float = 0.95) -> dict[str, Any]:
+def unconverged(increments: int, steps: int, share: float = 0.95) -> dict[str, Any]:
     """Mass lost on the way to `share` of the onset load if the history follows states short of equilibrium.
 
     Each of the `increments` moves the grips alone, then makes `steps` full Newton steps (-1: to the equilibrium), and
@@ -120,13 +120,13 @@ def _lost(body: Body, state: State) -> float:
     return 1 - float(body.density.load @ state.gamma) / float(body.density.load.sum())
 
 
-def plan_sweeps(quick: bool) -> list[Planned]:
+def plan_unconverged(quick: bool) -> list[Planned]:
     counts = (1, 4, 16) if quick else (1, 2, 4, 8, 16, 32, 64)
-    return [Planned(f"{n} increments, {k if k >= 0 else 'all'} steps", partial(sweeps, n, k), 0.02 * n + 0.1)
+    return [Planned(f"{n} increments, {k if k >= 0 else 'all'} steps", partial(unconverged, n, k), 0.02 * n + 0.1)
             for k in (0, 1, 2, 3, -1) for n in counts]
 
 
-def draw_sweeps(axes: Sequence[Axes], points: Points) -> None:
+def draw_unconverged(axes: Sequence[Axes], points: Points) -> None:
     ax = axes[0]
     for k, colour, style in ((0, RED, "s--"), (1, "#c9793f", "^--"), (2, SAND, "v--"), (3, "0.5", "d--"),
                              (-1, BLUE, "o-")):
@@ -187,7 +187,7 @@ def length(per_length: float, n: int) -> dict[str, Any]:
         if state.ledger.elastic < 1e-3 * state.ledger.initial:
             break
     return {"l_over_h": per_length, "n": n, **body.onset_figures, "U": state.ledger.paper, "D": state.ledger.sink,
-            "sweeps": state.step, "grip": state.grip * 2e-3, "balance": state.ledger.error(state.ledger.initial)}
+            "passes": state.step, "grip": state.grip * 2e-3, "balance": state.ledger.error(state.ledger.initial)}
 
 
 def plan_length(quick: bool) -> list[Planned]:
