@@ -10,10 +10,11 @@ import numpy as np
 import skfem
 
 from skfsink.fem.space import Space
+from skfsink.fields.body import Body
 from skfsink.fields.density import DensitySolver
-from skfsink.fields.energy import Ledger
 from skfsink.fields.momentum import Momentum
 from skfsink.fields.state import State
+from skfsink.loads.schedule import Loading
 from skfsink.material import AAA, Material, SinkLaw
 from skfsink.material.regions import Region
 from skfsink.methods.statics import Statics
@@ -92,8 +93,13 @@ def patchy(space: Space, seed: int = 2, dead: float = 0.2) -> np.ndarray:
     return gamma
 
 
+def held_body(momentum: Momentum, density: DensitySolver, free: np.ndarray, velocity: np.ndarray, **settings) -> Body:
+    """A body whose degrees of freedom but `free` (n*dim,) are held, and move at `velocity` (n, dim)."""
+    return Body(momentum, density, Loading.steady(momentum.space, free, velocity), **settings)
+
+
 class Fracture(NamedTuple):
-    """A body just past its onset: a maker of fresh states, and what an integrator takes."""
+    """A body just past its onset: a maker of fresh states, the body, and what it was made from."""
 
     fresh: Callable[[], State]
     momentum: Momentum
@@ -101,18 +107,21 @@ class Fracture(NamedTuple):
     free: np.ndarray
     velocity: np.ndarray
 
+    @property
+    def body(self) -> Body:
+        """What an integrator takes."""
+        return held_body(self.momentum, self.density, self.free, self.velocity)
+
 
 def at_onset(space: Space, speed: float = 1e-3, overshoot: float = 0.01, regions: Sequence[Region] = ()) -> Fracture:
     """`space` loaded to its onset and scaled just past it, as the event of a run begins."""
     momentum, density = Momentum(space, AAA(), regions=regions), DensitySolver(space, SinkLaw(), regions=regions)
     free, velocity = grips(space, speed)
     state = State.intact(space)
-    for _ in Statics(momentum, density, free, velocity).load(state):
+    for _ in Statics(held_body(momentum, density, free, velocity)).load(state):
         pass
     assert state.gamma.min() > 0.85
-    state.u *= 1 + overshoot
-    state.grip *= 1 + overshoot
-    state.time, state.step, state.ledger = 0.0, 0, Ledger()
+    state.begin_event(overshoot)
     return Fracture(lambda: copy.deepcopy(state), momentum, density, free, velocity)
 
 

@@ -18,10 +18,10 @@ from skfsink.run.simulate import Simulation
 from skfsink.scene.controls import Controls
 from skfsink.scene.scene import Scene
 from skfsink.study.blocks import block
-from skfsink.study.body import PULLED, Body
+from skfsink.study.plate import PULLED, Plate
 
 PLAIN = block(15)      # h = l/1.5, without a notch: nothing to warn of
-NOTCHED = Body(block(15, notch=0.4, width=0.06))
+NOTCHED = Plate(block(15, notch=0.4, width=0.06))
 SHARP = r"a notch turns by 90 degrees"  # what a notch cut out of rows of elements always gives
 
 

@@ -23,9 +23,9 @@ from skfsink.run.simulate import Simulation
 from skfsink.scene.controls import Controls
 from skfsink.scene.scene import Scene
 from skfsink.study.blocks import block
-from skfsink.study.body import Body
+from skfsink.study.plate import Plate
 
-SMALL = Body(block(5, notch=0.4, width=0.2))
+SMALL = Plate(block(5, notch=0.4, width=0.2))
 EXAMPLES = settings(max_examples=20, deadline=None, derandomize=True, database=None, phases=[Phase.generate],
                     suppress_health_check=[HealthCheck.function_scoped_fixture])
 

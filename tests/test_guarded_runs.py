@@ -19,9 +19,9 @@ from skfsink.methods.controls import ExplicitControls, HHTControls, StaticsContr
 from skfsink.methods.explicit import Explicit
 from skfsink.methods.statics import Statics
 from skfsink.run.display import Display
-from skfsink.run.simulate import Simulation, onset_copy
+from skfsink.run.simulate import Simulation
 from skfsink.run.summarize import summarize
-from skfsink.study.body import Body
+from skfsink.study.plate import Plate
 
 
 def test_too_long_a_step_stops_the_run_with_the_cure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
@@ -64,7 +64,7 @@ def test_unconverged_pass_is_not_followed(monkeypatch: pytest.MonkeyPatch):
     state.u *= 1.01
     state.grip *= 1.01
     state.step = 0
-    before = onset_copy(state)
+    before = state.copy()
     statics = NOTCHED.statics()
     monkeypatch.setattr(statics, "SNAP", 1)
     with pytest.raises(ConvergenceError, match=r"pass 1: no equilibrium within 1 Newton steps; the history follows"):
@@ -81,7 +81,7 @@ def test_unconverged_pass_is_not_followed(monkeypatch: pytest.MonkeyPatch):
 def test_onset_says_why_it_is_one(most: int, refused: str, early: float, message: str,
                                   caplog: pytest.LogCaptureFixture):
     """Fails if an iteration of the two fields that was cut short passes for the onset, or harmless ones are told."""
-    statics = Statics(NOTCHED.momentum, NOTCHED.density, *NOTCHED.constraints, StaticsControls(max_passes=most))
+    statics = Statics(NOTCHED.body, StaticsControls(max_passes=most))
     state = State.intact(NOTCHED.sample.space)
     for _ in statics.load(state):
         assert state.gamma.min() > 0.8
@@ -108,7 +108,7 @@ def test_onset_that_is_the_end_of_newton_is_said_so(monkeypatch: pytest.MonkeyPa
 
 def test_energy_in_deleted_elements_is_booked_as_such():
     """Fails if it goes to the sink: with a high threshold and no force floor elements still bear force when deleted."""
-    body = Body(NOTCHED.sample, deletion=0.3, force_floor=0.0, overshoot=0.01)
+    body = Plate(NOTCHED.sample, deletion=0.3, force_floor=0.0, overshoot=0.01)
     state = body.onset
     state.u *= 1.01
     state.time, state.step, state.ledger = 0.0, 0, Ledger()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bodies import Fracture, box, ends
+from bodies import Fracture, box, ends, held_body
 
 from skfsink.fields.density import DensitySolver
 from skfsink.fields.momentum import Momentum
@@ -27,11 +27,11 @@ def swinging(kind: str, steps: int, integrator: str, alpha: float = 0.0, end: fl
     state.u[:, 0] = 0.05 * np.sin(np.pi * y / 2)
     state.u[:, 1] = 0.025 * np.sin(np.pi * y / 2) * x
     if integrator == "explicit":
-        scheme = Explicit(momentum, density, free, still, ExplicitControls(gamma_every=10))
+        scheme = Explicit(held_body(momentum, density, free, still), ExplicitControls(gamma_every=10))
         scheme._set_step = lambda state: None
         scheme._mode, scheme.dt = np.zeros(1), end / steps
     else:
-        scheme = HHT(momentum, density, free, still, HHTControls(alpha=alpha, dt=end / steps, **EXACT))
+        scheme = HHT(held_body(momentum, density, free, still), HHTControls(alpha=alpha, dt=end / steps, **EXACT))
     scheme.begin(state)
     for _ in range(steps):
         scheme.step(state)
@@ -82,7 +82,7 @@ def test_explicit_ledger_closes_through_a_fracture(fracture: Fracture, gamma_eve
     """
     fresh, momentum, density, free, velocity = fracture
     state = fresh()
-    explicit = Explicit(momentum, density, free, velocity, ExplicitControls(gamma_every=gamma_every))
+    explicit = Explicit(held_body(momentum, density, free, velocity), ExplicitControls(gamma_every=gamma_every))
     explicit.begin(state)
     initial = state.ledger.initial
     worst = 0.0
@@ -114,7 +114,7 @@ def test_hht_ledger_closes_through_a_fracture(fracture: Fracture, coupling: str)
     state = fresh()
     controls = HHTControls(dt=4e-7, coupling=coupling, force_tolerance=1e-8, correction_tolerance=1e-8,
                            gamma_tolerance=1e-7)
-    hht = HHT(momentum, density, free, velocity, controls)
+    hht = HHT(held_body(momentum, density, free, velocity), controls)
     hht.begin(state)
     for _ in hht.run(state, 2.5e-5):
         assert abs(state.ledger.balance) <= 1e-8 * state.ledger.initial
@@ -129,8 +129,8 @@ def test_integrators_agree_on_a_fracture(fracture: Fracture):
     """Fails if one of them is wrong: the energies at 20 us agree to 10 % of the initial energy on this coarse mesh."""
     fresh, momentum, density, free, velocity = fracture
     ledgers = []
-    for make in (lambda: Explicit(momentum, density, free, velocity),
-                 lambda: HHT(momentum, density, free, velocity, HHTControls(dt=2e-7))):
+    for make in (lambda: Explicit(held_body(momentum, density, free, velocity)),
+                 lambda: HHT(held_body(momentum, density, free, velocity), HHTControls(dt=2e-7))):
         state, scheme = fresh(), make()
         scheme.begin(state)
         for _ in scheme.run(state, 2e-5):

@@ -12,6 +12,7 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
+from bodies import held_body
 from plates import invoke, plate
 from references import scene_of
 
@@ -32,7 +33,7 @@ from skfsink.methods.rest import LoadingFromRest
 from skfsink.run import model as models
 from skfsink.run.display import Display
 from skfsink.run.model import LADDERS, REFERENCE, Ladder, choose_model, level
-from skfsink.run.quantities import relative_error
+from skfsink.run.quantities import measured, relative_error
 from skfsink.run.simulate import Simulation
 from skfsink.scene.options import QUANTITIES, Options
 from skfsink.scene.scene import Scene
@@ -77,7 +78,7 @@ def test_a_half_has_the_onset_of_the_whole(tmp_path: Path) -> None:
         scene = with_options("single_edge_notch", "coarse-mirror", half=half, event_time=1e-9)
         simulation = Simulation(scene, tmp_path, Display(quiet=True))
         simulation.run()
-        found[half] = skfsink.results.result.measured(scene, simulation.recorder), \
+        found[half] = measured(scene, simulation.recorder), \
             simulation.state.ledger.initial * scene.whole.energy
     for name in ("onset_load", "onset_displacement"):
         assert found[True][0][name] == pytest.approx(found[False][0][name], rel=1e-3)
@@ -218,8 +219,8 @@ def test_a_start_from_rest_needs_a_grip_that_moves(tmp_path: Path) -> None:
         replace(scene, grips=(Grip("top", (0.0, 0.0)), Grip("bottom", (0.0, 0.0))))
     space = scene.sample.space
     with pytest.raises(ParameterError, match="start rest needs a grip that moves"):
-        LoadingFromRest(Momentum(space, AAA()), DensitySolver(space, scene.sink_law),
-                        scene.constraints()[0], np.zeros_like(space.X), HHTControls())
+        LoadingFromRest(held_body(Momentum(space, AAA()), DensitySolver(space, scene.sink_law),
+                                  scene.constraints()[0], np.zeros_like(space.X)), HHTControls())
 
 
 # --- the ladder ---

@@ -13,8 +13,8 @@ from guarded import NOTCHED, PLAIN, simulation
 
 from skfsink.errors import ConvergenceError, Interrupted, MeshError, ParameterError
 from skfsink.fem.space import Space
+from skfsink.fields.body import Body
 from skfsink.fields.density import DensitySolver
-from skfsink.fields.energy import Ledger
 from skfsink.fields.momentum import Momentum
 from skfsink.fields.state import State
 from skfsink.loads.grips import Grip, Ramp, Traction
@@ -43,10 +43,9 @@ class Loaded:
         self.space = space
         self.loading = Loading(space, [(side(space, g.boundary), g) for g in grips],
                                [(side(space, t.boundary), t) for t in tractions])
-        self.momentum, self.density = Momentum(space, AAA()), DensitySolver(space, law)
-        self.momentum.dead = self.loading.dead
-        self.statics = Statics(self.momentum, self.density, self.loading.free, self.loading,
-                               StaticsControls(**controls))
+        self.momentum = Momentum(space, AAA(), dead=self.loading.dead)
+        self.body = Body(self.momentum, DensitySolver(space, law), self.loading)
+        self.statics = Statics(self.body, StaticsControls(**controls))
         self.state = State.intact(space)
 
     def load(self, until: float = np.inf) -> State:
@@ -58,11 +57,8 @@ class Loaded:
 
     def start(self, past: float) -> State:
         """Go from the onset to the start of the event."""
-        state = self.state
-        state.u *= 1 + past
-        state.grip = self.statics.past(state.grip, past)
-        state.time, state.step, state.phase, state.ledger = 0.0, 0, "event", Ledger()
-        return state
+        self.state.begin_event(past, self.statics.past(self.state.grip, past))
+        return self.state
 
 
 def side(space: Space, name: str) -> np.ndarray:
@@ -231,15 +227,14 @@ def test_suddenly_loaded_body_swings_about_the_static_solution(integrator: str) 
     mass = body.momentum.lumped_mass(1e-9)
     period = 2 * np.pi * float(np.sqrt(mass[side(space, "y+")].sum() * static / T))
     steps = 200
-    arguments = (body.momentum, body.density, body.loading.free, body.loading)
     scheme: Explicit | HHT
     if integrator == "explicit":
-        scheme = Explicit(*arguments, ExplicitControls(gamma_every=10**6))
+        scheme = Explicit(body.body, ExplicitControls(gamma_every=10**6))
         scheme._set_step = lambda state: None  # type: ignore[method-assign]
         scheme._mode, scheme.dt = np.zeros(1), period / steps
     else:
-        scheme = HHT(*arguments, HHTControls(alpha=0.0, dt=period / steps, force_tolerance=1e-9,
-                                             correction_tolerance=1e-9))
+        scheme = HHT(body.body, HHTControls(alpha=0.0, dt=period / steps, force_tolerance=1e-9,
+                                            correction_tolerance=1e-9))
     scheme.begin(state)
     swing = []
     for _ in range(2 * steps):
@@ -268,9 +263,8 @@ def test_plate_torn_by_a_traction_closes_its_ledger(integrator: str) -> None:
     assert state.grip < 1.0 and state.gamma.min() < 0.99
     body.start(0.01)
     state.grip = 1.0
-    arguments = (body.momentum, body.density, body.loading.free, body.loading)
-    scheme: Explicit | HHT = (Explicit(*arguments) if integrator == "explicit"
-                              else HHT(*arguments, HHTControls(dt=4e-7, **FINE)))
+    scheme: Explicit | HHT = (Explicit(body.body) if integrator == "explicit"
+                              else HHT(body.body, HHTControls(dt=4e-7, **FINE)))
     scheme.begin(state)
     scale = state.ledger.elastic
     assert state.ledger.initial == pytest.approx(scale + state.ledger.loads + state.ledger.kinetic)
@@ -293,8 +287,7 @@ def test_loaded_side_that_fails_drops_its_load(integrator: str) -> None:
     assert dead is not None
     body.start(0.0)
     state.W_max[dead.elements[:2]] = 1.0  # of which nothing is left at the next density solve
-    arguments = (body.momentum, body.density, body.loading.free, body.loading)
-    scheme: Explicit | HHT = Explicit(*arguments) if integrator == "explicit" else HHT(*arguments, HHTControls(
+    scheme: Explicit | HHT = Explicit(body.body) if integrator == "explicit" else HHT(body.body, HHTControls(
         dt=2e-7, coupling="single" if integrator == "single" else "iterated", **FINE))
     scheme.begin(state)
     scale, full, work = state.ledger.elastic, dead.resultant(0)[1], state.ledger.work

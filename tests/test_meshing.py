@@ -15,6 +15,7 @@ import pytest
 from skfsink.errors import MissingExtra, ParameterError
 from skfsink.meshing import outline as meshing
 from skfsink.meshing import shapes
+from skfsink.meshing.vtu import read_mesh, write_mesh
 
 FOLDER = Path(__file__).resolve().parents[1] / "cases" / "single_edge_notch" / "meshes"
 SIDE, NOTCH, RADIUS = 4.0, 1.0, 0.05
@@ -156,9 +157,9 @@ def test_files_are_small():
 
 
 def test_written_mesh_reads_back(tmp_path):
-    mesh = meshing.read_mesh(FOLDER / "coarse.vtu")
+    mesh = read_mesh(FOLDER / "coarse.vtu")
     assert not mesh.cell_data and set(mesh.cell_sets) == {"left", "right", "top", "bottom", "notch"}
-    meshing.write_mesh(tmp_path / "again.vtu", mesh)
+    write_mesh(tmp_path / "again.vtu", mesh)
     assert meshio.read(tmp_path / "again.vtu").points.tolist() == read("coarse").points.tolist()
     assert (tmp_path / "again.vtu").read_bytes() == (FOLDER / "coarse.vtu").read_bytes()
 

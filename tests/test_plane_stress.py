@@ -6,7 +6,7 @@ import inspect
 
 import numpy as np
 import pytest
-from bodies import boundary, box, distorted, ends, grid, grips, notched, patchy, wavy
+from bodies import boundary, box, distorted, ends, grid, grips, held_body, notched, patchy, wavy
 from plates import plate
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
@@ -288,11 +288,11 @@ def test_crack_in_a_sheet_with_a_closed_ledger():
     momentum, density = Momentum(space, AAA(), "planestress"), DensitySolver(space, SinkLaw())
     free, velocity = grips(space, 1e-3)
     state = State.intact(space)
-    for _ in Statics(momentum, density, free, velocity).load(state):
+    for _ in Statics(held_body(momentum, density, free, velocity)).load(state):
         pass
     state.u *= 1.01
     state.time, state.step, state.ledger = 0.0, 0, Ledger()
-    explicit = Explicit(momentum, density, free, velocity)
+    explicit = Explicit(held_body(momentum, density, free, velocity))
     explicit.begin(state)
     for _ in explicit.run(state, 2e-5):
         assert explicit.dt <= explicit._interval

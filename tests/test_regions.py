@@ -12,7 +12,7 @@ import meshio
 import numpy as np
 import pytest
 import skfem
-from bodies import Fracture, at_onset, box, close, ends, grid, momentum_of, notched, patchy, wavy
+from bodies import Fracture, at_onset, box, close, ends, grid, held_body, momentum_of, notched, patchy, wavy
 from guarded import NOTCHED, Watched, scene, simulation
 from scipy.optimize import brentq
 from test_material_library import TISSUE, Hoops
@@ -210,7 +210,7 @@ def equilibrium(space: Space, held: np.ndarray, u: np.ndarray,
                 regions: Sequence[Region]) -> tuple[Momentum, np.ndarray]:
     """Equilibrium from `u` with the degrees of freedom `held` (n, dim), and the displacement."""
     momentum = Momentum(space, SOFT, regions=regions)
-    statics = Statics(momentum, DensitySolver(space, LAW), ~held.ravel(), np.zeros_like(u))
+    statics = Statics(held_body(momentum, DensitySolver(space, LAW), ~held.ravel(), np.zeros_like(u)))
     statics.newton.tolerance = 1e-11
     return momentum, statics.equilibrium(u)[0]
 
@@ -279,7 +279,7 @@ def test_a_strip_cracks_in_its_weaker_half() -> None:
     free, velocity = np.zeros(space.X.shape, bool), np.zeros_like(space.X)
     free[:, 1] = ~(low | high)
     velocity[low, 1], velocity[high, 1] = -1e-3, 1e-3
-    statics, state = Statics(momentum, density, free.ravel(), velocity), State.intact(space)
+    statics, state = Statics(held_body(momentum, density, free.ravel(), velocity)), State.intact(space)
     for _ in statics.load(state):
         pass
     F = np.zeros((4001, 3, 3))
@@ -305,8 +305,8 @@ def test_sweeps_wait_by_the_limiter_of_each_part() -> None:
     """Fails if points wait by their energy, where what counts is how far it is past the limiter of their material."""
     space = box("quad", 2)
     regions = [Region("weak", np.array([0]), AAA(), SinkLaw(phi=0.05))]
-    statics = Statics(Momentum(space, AAA()), DensitySolver(space, SinkLaw(phi=0.5), regions=regions),
-                      np.ones(2 * space.n_nodes, bool), np.zeros_like(space.X))
+    statics = Statics(held_body(Momentum(space, AAA()), DensitySolver(space, SinkLaw(phi=0.5), regions=regions),
+                                np.ones(2 * space.n_nodes, bool), np.zeros_like(space.X)))
     state, W = State.intact(space), np.zeros_like(space.w)
     W[0], W[1], W[2], W[3] = 0.15, 0.6, 1.4, 0.4        # 3, 1.2, 2.8 and 0.8 times their limiters
     assert statics._follow(state, W)
@@ -335,7 +335,7 @@ def test_explicit_ledger_closes_in_two_materials(layered: Fracture) -> None:
     """Fails if energy, mass, sink or deletion takes another element's material: the balance closes to 1e-10."""
     fresh, momentum, density, free, velocity = layered
     state = fresh()
-    explicit = Explicit(momentum, density, free, velocity, ExplicitControls())
+    explicit = Explicit(held_body(momentum, density, free, velocity), ExplicitControls())
     explicit.begin(state)
     for _ in explicit.run(state, 4e-5):
         assert abs(state.ledger.balance) <= 1e-10 * state.ledger.initial
@@ -350,7 +350,7 @@ def test_hht_ledger_closes_in_two_materials(layered: Fracture, mass: str, end: f
     """Fails as the explicit one does, with the tangent and mass of each material: 1e-8 with converged steps."""
     fresh, momentum, density, free, velocity = layered
     state = fresh()
-    hht = HHT(momentum, density, free, velocity, HHTControls(
+    hht = HHT(held_body(momentum, density, free, velocity), HHTControls(
         dt=4e-7, mass=mass, force_tolerance=1e-8, correction_tolerance=1e-8, gamma_tolerance=1e-7))
     hht.begin(state)
     for _ in hht.run(state, end):
@@ -365,8 +365,8 @@ def test_an_event_does_not_see_a_division_in_name_only(fracture: Fracture) -> No
     ends_ = []
     for regions in ((), scattered(SPACE, AAA(), AAA())):
         state = fresh()
-        explicit = Explicit(Momentum(SPACE, AAA(), regions=regions), DensitySolver(SPACE, LAW, regions=regions), free,
-                            velocity)
+        explicit = Explicit(held_body(Momentum(SPACE, AAA(), regions=regions),
+                                      DensitySolver(SPACE, LAW, regions=regions), free, velocity))
         explicit.begin(state)
         for _ in explicit.run(state, 2e-5):
             pass

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import scipy.linalg as la
-from bodies import boundary, box, ends
+from bodies import boundary, box, ends, held_body
 from test_density import crack
 
 from skfsink.fem.pattern import Pattern
@@ -37,7 +37,7 @@ def body(kind: str, case: str) -> tuple[Momentum, DensitySolver, np.ndarray, Sta
         state.u = space.X * (np.array([1.3, 1 / 1.3, 1.0])[:space.dim] - 1)
     momentum.set_gamma(state.gamma, state.deleted)
     if case.startswith("stretched "):
-        state.u, _ = Statics(momentum, density, free, np.zeros_like(space.X)).equilibrium(state.u)
+        state.u, _ = Statics(held_body(momentum, density, free, np.zeros_like(space.X))).equilibrium(state.u)
     return momentum, density, free, state
 
 
@@ -57,7 +57,7 @@ def test_estimate_of_the_highest_frequency(kind: str, case: str):
     assert 0.99 * exact < omega < exact * (1 + 1e-9)
     again, _ = highest_frequency(momentum, pattern, free, state.u, mass, mode)
     assert 0.99 * exact < again < exact * (1 + 1e-9)  # started from that mode, zero almost everywhere
-    explicit = Explicit(momentum, density, free, np.zeros_like(state.u))
+    explicit = Explicit(held_body(momentum, density, free, np.zeros_like(state.u)))
     explicit.begin(state)
     assert 0.3 * exact < np.sqrt(explicit._indicator(state.u)) < exact
 
@@ -70,7 +70,7 @@ def test_explicit_scheme_is_stable_just_below_the_limit_and_not_above(kind: str,
     Above the limit the fastest mode grows 1.63-fold a step, so sixty steps are plenty; below, it may swell fivefold.
     """
     momentum, density, free, state = body(kind, case)
-    explicit = Explicit(momentum, density, free, np.zeros_like(state.u),
+    explicit = Explicit(held_body(momentum, density, free, np.zeros_like(state.u)),
                         ExplicitControls(courant=0.98, gamma_every=10**6))
     explicit.begin(state)
     explicit._set_step(state)
@@ -126,7 +126,7 @@ def test_hht_damps_one_mode_as_predicted(alpha: float, z: float, mass: str):
     size = 1e-4
     state = State.intact(space)
     state.u.reshape(-1)[free] = size * mode
-    hht = HHT(momentum, density, free, np.zeros_like(space.X),
+    hht = HHT(held_body(momentum, density, free, np.zeros_like(space.X)),
               HHTControls(alpha=alpha, dt=z / omega, mass=mass, force_tolerance=1e-5, correction_tolerance=1e-5))
     hht.begin(state)
     A, predicted = amplification(alpha, z), [np.array([1.0, 0.0, -z * z])]

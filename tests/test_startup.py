@@ -22,9 +22,9 @@ import numpy as np, skfem
 import numba.core.dispatcher as dispatcher
 import skfsink.fem.kernels
 from skfsink.material import AAA
-from skfsink.momentum import Momentum
-from skfsink.pattern import Pattern
-from skfsink.space import Space
+from skfsink.fields.momentum import Momentum
+from skfsink.fem.pattern import Pattern
+from skfsink.fem.space import Space
 space = Space(skfem.MeshQuad.init_tensor(*2 * [np.linspace(0, 1, 3)]))
 for threads in (1, 2):
     skfsink.fem.kernels.Tiles.WORTH = 0
@@ -63,8 +63,8 @@ def test_a_start_compiles_what_it_needs_and_a_second_one_nothing(tmp_path: Path)
 FORCE = """
 import numpy as np, skfem
 from skfsink.material import NeoHookean
-from skfsink.momentum import Momentum
-from skfsink.space import Space
+from skfsink.fields.momentum import Momentum
+from skfsink.fem.space import Space
 momentum = Momentum(Space(skfem.MeshQuad.init_tensor(*2 * [np.linspace(0, 1, 3)])), NeoHookean())
 momentum.force(np.zeros_like(momentum.space.X))
 print(momentum.energy, len(list(__import__("pathlib").Path(r"CACHE").rglob("force_2d*"))))
@@ -82,7 +82,7 @@ def test_a_change_in_an_imported_module_is_seen(tmp_path: Path) -> None:
 
     Nor may a loop that has changed leave its old file behind.
     """
-    lanes = copied(tmp_path) / "skfsink" / "kernels" / "lanes.py"
+    lanes = copied(tmp_path) / "skfsink" / "fem" / "kernels" / "lanes.py"
     cache = tmp_path / "cache"
 
     def energy() -> tuple[float, int]:
@@ -121,7 +121,7 @@ def test_stamps_cover_what_modules_import() -> None:
                 found |= {path for place in places for path in (place.with_name(f"{place.name}.py"),
                                                                 place / "__init__.py") if path.is_file()}
         assert found <= set(sources(file)), file
-    lanes, shared = package / "kernels" / "lanes.py", package / "kernels" / "shared.py"
+    lanes, shared = (package / "fem" / "kernels" / name for name in ("lanes.py", "shared.py"))
     assert lanes in sources(shared) and lanes not in sources(package / "material" / "isotropic.py")
 
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from bodies import Fracture, box, ends, grid, grips, notched, wavy
+from bodies import Fracture, box, ends, grid, grips, held_body, notched, wavy
 
 from skfsink.errors import ConvergenceError, ParameterError
 from skfsink.fem.space import Space
@@ -32,7 +32,7 @@ class Body(NamedTuple):
     def of(cls, space: Space, speed: float = 1e-3, **controls: float) -> Body:
         momentum = Momentum(space, AAA())
         free, velocity = grips(space, speed)
-        statics = Statics(momentum, DensitySolver(space, LAW), free, velocity, StaticsControls(**controls))
+        statics = Statics(held_body(momentum, DensitySolver(space, LAW), free, velocity), StaticsControls(**controls))
         return cls(momentum, statics, State.intact(space))
 
 
@@ -95,7 +95,8 @@ def test_strength_of_a_block_is_the_closed_form(kind: str, peak: float):
         free[np.isclose(space.X[:, axis], 0), axis] = False
     velocity = np.zeros_like(space.X)
     velocity[high, 1] = 1.0
-    statics = Statics(momentum, DensitySolver(space, LAW), free.ravel(), velocity, StaticsControls(increment=0.01))
+    body = held_body(momentum, DensitySolver(space, LAW), free.ravel(), velocity)
+    statics = Statics(body, StaticsControls(increment=0.01))
     state = State.intact(space)
     stresses = []
     for _ in statics.load(state):
@@ -171,9 +172,7 @@ def test_quasi_static_crack_runs_straight_and_the_ledger_closes(n: int):
     """Fails if a pass loses energy: released + D make up what was stored, and the crack cuts the plate."""
     body = loaded(n)
     state, statics, space = body.state, body.statics, body.statics.space
-    state.u *= 1.005
-    state.grip *= 1.005
-    state.step, state.ledger = 0, Ledger()
+    state.begin_event(0.005)
     high = ends(space)[1]
     gamma, elastic = state.gamma, np.inf
     for _ in statics.propagate(state):
@@ -228,7 +227,7 @@ def test_points_wait_while_one_is_much_further_past_the_limit(fracture: Fracture
     momentum, density = fracture.momentum, fracture.density
     state = fracture.fresh()
     momentum.set_gamma(state.gamma, state.deleted)
-    statics = Statics(momentum, density, fracture.free, fracture.velocity)
+    statics = Statics(held_body(momentum, density, fracture.free, fracture.velocity))
     phi, before = density.law.phi, state.W_max.copy()
     W = 0.5 * before
     W[0], W[1], W[2], W[3] = 3.0 * phi, 2.5 * phi, 1.5 * phi, 0.9 * phi
@@ -249,7 +248,7 @@ def test_bent_strip_snaps_back(kind: str):
     space = Space(grid(kind, shape, size))
     momentum = Momentum(space, AAA())
     free = np.repeat(~ends(space, axis=0)[0], space.dim)
-    statics = Statics(momentum, DensitySolver(space, LAW), free, np.zeros_like(space.X))
+    statics = Statics(held_body(momentum, DensitySolver(space, LAW), free, np.zeros_like(space.X)))
     x, y = space.X[:, 0], space.X[:, 1] - size[1] / 2
     angle, radius = np.pi * x, 1 / np.pi
     bent = space.X.copy()
@@ -264,9 +263,7 @@ def test_passes_resume_to_the_same_bits():
     """Fails if a checkpoint of the passes misses what the factors that are kept were made from."""
     bodies = [loaded(), loaded()]
     for body in bodies:
-        body.state.u *= 1.005
-        body.state.grip *= 1.005
-        body.state.step, body.state.ledger = 0, Ledger()
+        body.state.begin_event(0.005)
     whole, parts = bodies
     for state in whole.statics.propagate(whole.state):
         if state.step == 9:

@@ -18,10 +18,10 @@ from skfsink.errors import ConvergenceError, InstabilityError, Interrupted, Outp
 from skfsink.methods.controls import ExplicitControls
 from skfsink.run.display import Display
 from skfsink.study import integrators, models, solvers, systems
-from skfsink.study.body import SLAB, Body, Front, first_passages
 from skfsink.study.meshes import load_plate
 from skfsink.study.pareto import pareto_front
 from skfsink.study.part import Part, Planned
+from skfsink.study.plate import SLAB, Front, Plate, first_passages
 from skfsink.study.rates import extrapolated, observed_rate
 from skfsink.study.refinement import plate
 from skfsink.study.speed_accuracy import PARTS, run_parts, speed_accuracy
@@ -140,16 +140,16 @@ def test_division_keeps_the_plate():
 
 def test_half_plate_and_slab_are_the_plate():
     """Fails if figures of a half, or of a slab held in z, are not those of the whole plate in plane strain."""
-    whole = Body(load_plate("half0", mirrored=True)).held_at(0.05)
-    half = Body(load_plate("half0"), models.HALF, 2).held_at(0.05)
-    slab = Body(load_plate("half0", mirrored=True, slab=(0.05, 1)), SLAB).held_at(0.05)
+    whole = Plate(load_plate("half0", mirrored=True)).held_at(0.05)
+    half = Plate(load_plate("half0"), models.HALF, 2).held_at(0.05)
+    slab = Plate(load_plate("half0", mirrored=True, slab=(0.05, 1)), SLAB).held_at(0.05)
     for other in (half, slab):
         assert other == pytest.approx(whole, rel=1e-6)
 
 
 def test_an_event_that_does_not_arrive_is_an_error():
     """Fails if a crack that has not gone the way is given an arrival time, or the onset is changed by an event."""
-    body = Body(load_plate("plate0"))
+    body = Plate(load_plate("plate0"))
     before = body.onset
     with pytest.raises(ConvergenceError, match=r"mm of 1 mm in 2 µs"):
         body.event(lambda b: b.explicit(ExplicitControls()), limit=2e-6)

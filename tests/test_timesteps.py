@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from bodies import Fracture, grips, notched
+from bodies import Fracture, grips, held_body, notched
 
 from skfsink.errors import ConvergenceError, InstabilityError
 from skfsink.fields.density import Density, DensitySolver
@@ -19,10 +19,10 @@ from skfsink.methods.explicit import Explicit
 from skfsink.methods.hht import HHT
 
 MAKERS: dict[str, Callable] = {
-    "explicit": lambda *args: Explicit(*args, ExplicitControls(gamma_every=4)),
-    "explicit, interval of gamma by itself": lambda *args: Explicit(*args),
-    "hht": lambda *args: HHT(*args, HHTControls(dt=2e-7)),
-    "hht, single pass": lambda *args: HHT(*args, HHTControls(dt=2e-7, coupling="single")),
+    "explicit": lambda *args: Explicit(held_body(*args), ExplicitControls(gamma_every=4)),
+    "explicit, interval of gamma by itself": lambda *args: Explicit(held_body(*args)),
+    "hht": lambda *args: HHT(held_body(*args), HHTControls(dt=2e-7)),
+    "hht, single pass": lambda *args: HHT(held_body(*args), HHTControls(dt=2e-7, coupling="single")),
 }
 
 
@@ -65,7 +65,7 @@ def test_explicit_says_when_it_has_blown_up(fracture: Fracture):
     """Fails if a run with too long a step goes on with infinite energies."""
     fresh, momentum, density, free, velocity = fracture
     state = fresh()
-    explicit = Explicit(momentum, density, free, velocity, ExplicitControls(gamma_every=10**6))
+    explicit = Explicit(held_body(momentum, density, free, velocity), ExplicitControls(gamma_every=10**6))
     explicit.begin(state)
     explicit._set_step(state)
     explicit.dt *= 1.5
@@ -84,7 +84,7 @@ def test_step_follows_the_deformed_state():
         momentum, density = Momentum(space, AAA()), DensitySolver(space, SinkLaw(phi=1e6))
         state = State.intact(space)
         state.u = space.X * (np.array([1 / stretch, stretch]) - 1)
-        explicit = Explicit(momentum, density, free, still, ExplicitControls(gamma_every=1))
+        explicit = Explicit(held_body(momentum, density, free, still), ExplicitControls(gamma_every=1))
         explicit.begin(state)
         explicit.step(state)
         steps.append(explicit.dt)
@@ -96,7 +96,7 @@ def test_hht_refuses_steps_that_are_too_long(fracture: Fracture, dt: float):
     """Fails if a far too long step through a running crack is taken as it comes, or leaves unsound fields."""
     fresh, momentum, density, free, velocity = fracture
     state = fresh()
-    hht = HHT(momentum, density, free, velocity, HHTControls(dt=dt))
+    hht = HHT(held_body(momentum, density, free, velocity), HHTControls(dt=dt))
     hht.begin(state)
     for _ in hht.run(state, 3e-5):
         pass
@@ -113,7 +113,7 @@ def test_hht_gives_up_with_a_reason(fracture: Fracture):
     """Fails if a step that never converges loops for ever, or leaves a changed state behind."""
     fresh, momentum, density, free, velocity = fracture
     state = fresh()
-    hht = HHT(momentum, density, free, velocity, HHTControls(dt=1e-6, dt_least=9e-7, max_iterations=3,
+    hht = HHT(held_body(momentum, density, free, velocity), HHTControls(dt=1e-6, dt_least=9e-7, max_iterations=3,
                                                             force_tolerance=1e-14))
     hht.begin(state)
     u = state.u.copy()
@@ -127,7 +127,7 @@ def test_hht_halves_a_step_whose_density_does_not_converge(fracture: Fracture, m
     """Fails if the density solver's failure in a trial ends the run, and is not taken as a step that is too long."""
     fresh, momentum, density, free, velocity = fracture
     state, update = fresh(), density.update
-    hht = HHT(momentum, density, free, velocity, HHTControls(dt=1e-7))
+    hht = HHT(held_body(momentum, density, free, velocity), HHTControls(dt=1e-7))
     hht.begin(state)
 
     def fails(W_max: np.ndarray, before: Density) -> Density:
@@ -148,7 +148,7 @@ def test_nodes_that_lost_their_mass_stay_near_the_body(fracture: Fracture, mass:
     """
     fresh, momentum, density, free, velocity = fracture
     state = fresh()
-    hht = HHT(momentum, density, free, velocity, HHTControls(dt=2e-7, mass=mass))
+    hht = HHT(held_body(momentum, density, free, velocity), HHTControls(dt=2e-7, mass=mass))
     hht.begin(state)
     for _ in hht.run(state, 4e-5):
         assert np.abs(state.u).max() < 0.3
@@ -162,8 +162,8 @@ def slow_loading(speed: float) -> tuple[HHT, State, float]:
     momentum, density = Momentum(space, AAA()), DensitySolver(space, SinkLaw())
     free, velocity = grips(space, speed)
     duration = 0.02 / speed
-    return (HHT(momentum, density, free, velocity, HHTControls(dt=duration / 20, dt_first=1e-8)), State.intact(space),
-            duration)
+    body = held_body(momentum, density, free, velocity)
+    return HHT(body, HHTControls(dt=duration / 20, dt_first=1e-8)), State.intact(space), duration
 
 
 @pytest.mark.parametrize("speed", [1e-3, 1e-9])

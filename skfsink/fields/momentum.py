@@ -48,6 +48,7 @@ class Momentum:
     force_floor: Gauss points with gamma below this exert no force. Their stiffness and mass are then gone together.
     threads: that share the loops over elements; results do not depend on their number.
     regions: elements of other materials.
+    dead: dead loads, if there are any, at the load time last given to :meth:`set_time`; `force` is less them.
 
     Attributes
     ----------
@@ -55,14 +56,13 @@ class Momentum:
     rho0: density of the intact solid [t/mm^3], a number, or where materials differ one for each element (ne, 1).
     shear_moduli, shear_wave_speeds: least and greatest of the materials [MPa; m/s].
     energy: gamma-weighted stored energy at the last evaluation [N mm; N mm/mm in 2D].
-    dead: dead loads, if there are any, at the load time last given to :meth:`set_time`; `force` is less them.
-    loads: their potential -f.u at the last evaluation, in the same units.
+    loads: potential -f.u of the dead loads at the last evaluation, in the same units.
     least_J: least J (plane stress: its part in the plane) at a Gauss point with gamma > 0 at the last evaluation.
     evaluations: how often the force was evaluated.
     """
 
     def __init__(self, space: Space, material: Material, element: str = "jbar", force_floor: float = 1e-3,
-                 threads: int = 1, regions: Sequence[Region] = ()) -> None:
+                 threads: int = 1, regions: Sequence[Region] = (), *, dead: DeadLoad | None = None) -> None:
         if element not in ELEMENTS:
             raise ParameterError(f"element must be one of {', '.join(ELEMENTS)}; got {element!r}")
         check_element(element, space)
@@ -79,7 +79,7 @@ class Momentum:
         rho0 = by_element(space.n_elements, material.rho0, regions, lambda region: region.material.rho0)
         self.rho0 = rho0[:, None] if isinstance(rho0, np.ndarray) else rho0
         self.energy = self.loads = 0.0
-        self.dead: DeadLoad | None = None
+        self.dead = dead
         self.least_J = 1.0
         self.evaluations = 0
         self._intact = self._lumped(np.ones_like(space.w))

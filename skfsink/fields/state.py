@@ -1,8 +1,10 @@
-"""The fields that evolve."""
+"""The state of a body: the fields that evolve, and the clocks and energies that belong to them."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from copy import deepcopy
+from dataclasses import asdict, dataclass, field, fields
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +17,9 @@ __all__ = ["State"]
 @dataclass
 class State:
     """Everything a run needs to go on from where it is; arrays are owned and changed in place or replaced.
+
+    A field that is added here is copied, kept in a checkpoint and read from it without being named anywhere else: it
+    has to be an array, None, or of plain values as JSON has them.
 
     Attributes
     ----------
@@ -51,3 +56,39 @@ class State:
         zero = np.zeros_like(space.X)
         return cls(zero, zero.copy(), zero.copy(), np.ones(space.n_nodes), np.zeros_like(space.w),
                    np.zeros(space.n_elements, bool))
+
+    def copy(self) -> State:
+        """An independent copy, to start another analysis from."""
+        return deepcopy(self)
+
+    def begin_event(self, overshoot: float = 0.0, grip: float | None = None) -> None:
+        """Start the event: clocks and ledger at zero, the displacement scaled past the onset by `overshoot`.
+
+        `grip` is the load time past the onset [s]; without it, it grows by the same share, as under steady grips.
+        """
+        self.u *= 1.0 + overshoot
+        self.grip = self.grip * (1.0 + overshoot) if grip is None else grip
+        self.time, self.step, self.phase, self.ledger = 0.0, 0, "event", Ledger()
+
+    # --- checkpoints ---
+    def stored(self) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+        """Fields that are arrays, and those of plain values, by name."""
+        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        arrays = {name: value for name, value in values.items() if isinstance(value, np.ndarray)}
+        rest = {name: value for name, value in values.items() if name not in arrays}
+        return arrays, {**rest, "ledger": asdict(self.ledger)}
+
+    @classmethod
+    def restored(cls, arrays: dict[str, np.ndarray], values: dict[str, Any]) -> State:
+        """The state of which :meth:`stored` gave the fields.
+
+        Raises
+        ------
+        KeyError, TypeError
+            One of them is missing, or is none of a state.
+        """
+        log = [(float(time), int(element)) for time, element in values["deletions"]]
+        state = cls(**{**arrays, **values, "deletions": log, "ledger": Ledger(**values["ledger"])})
+        if missing := {f.name for f in fields(cls)} - arrays.keys() - values.keys():
+            raise KeyError(min(missing))
+        return state

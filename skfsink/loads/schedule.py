@@ -77,13 +77,11 @@ class Loading:
             _check_held(space, free)
 
     @classmethod
-    def of(cls, space: Space, free: np.ndarray, motion: np.ndarray | Loading) -> Loading:
-        """`motion` itself, or grips that hold all but `free` (n*dim,) and move at the velocity `motion` (n, dim)."""
-        if isinstance(motion, Loading):
-            return motion
-        steady = cls(space, ())
-        steady.free, steady._steady = free, motion
-        return steady
+    def steady(cls, space: Space, free: np.ndarray, velocity: np.ndarray) -> Loading:
+        """Grips that hold all but the degrees of freedom `free` (n*dim,), and move at `velocity` (n, dim) [mm/s]."""
+        loading = cls(space, ())
+        loading.free, loading._steady = free, velocity
+        return loading
 
     def knot(self, t: float) -> float:
         """The next knot after load time `t`, infinity if there is none [s]."""

@@ -26,11 +26,10 @@ import numpy as np
 from ..errors import InstabilityError
 from ..fem.pattern import Pattern
 from ..fields.active_zone import Zone
+from ..fields.body import Body
 from ..fields.deletion import delete_failed, left_in
-from ..fields.density import Density, DensitySolver
-from ..fields.momentum import Momentum
+from ..fields.density import Density
 from ..fields.state import State
-from ..loads.schedule import Loading
 from ..system.jit import njit
 from .controls import ExplicitControls
 from .frequency import highest_frequency
@@ -47,16 +46,12 @@ class Explicit:
 
     Parameters
     ----------
-    momentum, density: the two fields.
-    free: (n*dim,) mask of the degrees of freedom that are not held by a grip.
-    motion: of the held ones, as a :class:`.Loading`, or as their velocity (n, dim) [mm/s], zero elsewhere. Where a ramp
-        has a knot a step ends.
+    body: the balances, and what loads it. Where a ramp of its loading has a knot a step ends.
     controls: options.
-    deletion: gamma at which an element fails.
 
     Attributes
     ----------
-    dt: the current step [s].   estimates: frequency estimates made.
+    dt: the current step [s].   estimates: frequency estimates made.   factorisations: none.
     reaction: (n, dim) internal force less the dead loads.
     """
 
@@ -66,18 +61,18 @@ class Explicit:
     CHECK = 5        # steps between looks at the cheap indicator
     RISEN = 25       # steps after which a risen indicator calls for an estimate; until then the step follows it
     FALLEN = 100     # steps after which a fallen one does; until then the step is shorter than it need be
+    _REMEMBERED = ("dt", "estimates", "_omega", "_indicator0", "_last_estimate", "_elastic", "_urgent", "_since_gamma")
     FED_IN = 1e-6    # energy a step may feed in before omega_max is estimated at once, of the initial energy
 
-    def __init__(self, momentum: Momentum, density: DensitySolver, free: np.ndarray, motion: np.ndarray | Loading,
-                 controls: ExplicitControls | None = None, deletion: float = 1e-6) -> None:
-        self.momentum, self.density, self.deletion = momentum, density, deletion
+    factorisations = 0
+
+    def __init__(self, body: Body, controls: ExplicitControls | None = None) -> None:
+        self.body, self.momentum, self.density, self.loading = body, body.momentum, body.density, body.loading
         self.controls = controls or ExplicitControls()
-        self.space = momentum.space
-        self.free = free
-        self._free = np.ascontiguousarray(free.reshape(-1, self.space.dim))
-        self.loading = Loading.of(self.space, free, motion)
+        self.space, self.free = body.space, body.free
+        self._free = np.ascontiguousarray(self.free.reshape(-1, self.space.dim))
         self._grip_velocity, self._knot = self.loading.velocity(0.0), np.inf
-        self._pattern = Pattern(self.space, self.space.dim, free, upper=True)
+        self._pattern = Pattern(self.space, self.space.dim, self.free, upper=True)
         self._mass_floor = max(self.controls.mass_floor, 1e-12)  # a node without mass or force stays where it is
         self.dt = 0.0
         self.estimates = 0
@@ -187,7 +182,7 @@ class Explicit:
         if now is before:
             return
         state.gamma, state.sink, self._zones = now
-        failed = delete_failed(self.space, state, self.deletion, self.density.failure_energy)
+        failed = delete_failed(self.space, state, self.body.deletion, self.density.failure_energy)
         left = left_in(momentum, state.gamma, failed) if failed.size else 0.0
         dead, loads = momentum.dead, None if momentum.dead is None else momentum.dead.values
         stored = momentum.set_gamma(state.gamma, state.deleted)
@@ -252,22 +247,18 @@ class Explicit:
     def memory(self) -> dict[str, np.ndarray]:
         """What the integrator remembers beyond the state, for a checkpoint."""
         assert self._mode is not None
-        scalars = [self.dt, self._omega, self._indicator0, self._last_estimate, self.estimates, self._elastic,
-                   self._urgent, self._since_gamma]
-        depths = {"zone_depths": np.array([zone.depth for zone in self._zones])} if self._zones else {}
-        return {"mode": self._mode, "scalars": np.array(scalars, float), "reaction": self.reaction, **depths}
+        return {"mode": self._mode, "reaction": self.reaction,
+                "zone_depths": np.array([zone.depth for zone in self._zones], int),
+                **{name: np.array(getattr(self, name)) for name in self._REMEMBERED}}
 
     def restore(self, state: State, memory: dict[str, np.ndarray]) -> None:
         """Go on exactly where :meth:`memory` was taken."""
         self.start(state)
-        self._mode = memory["mode"]
-        scalars = [float(value) for value in memory["scalars"]]
-        self.dt, self._omega, self._indicator0, self._elastic = *scalars[:3], scalars[5]
-        self._last_estimate, self.estimates = int(scalars[3]), int(scalars[4])
-        self._urgent, self._since_gamma = bool(scalars[6]), int(scalars[7])
-        self.reaction = memory["reaction"]
+        self._mode, self.reaction = memory["mode"], memory["reaction"]
+        for name in self._REMEMBERED:
+            setattr(self, name, memory[name].item())
         if self.density.zone is not None:
-            self._zones = tuple(self.density.zone.of_depth(depth) for depth in memory.get("zone_depths", ()))
+            self._zones = tuple(self.density.zone.of_depth(depth) for depth in memory["zone_depths"])
 
 
 def _half_square(v: np.ndarray) -> np.ndarray:

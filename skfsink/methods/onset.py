@@ -18,10 +18,9 @@ import numpy as np
 
 from ..errors import ConvergenceError
 from ..fem.indicators import greatest_stretch
-from ..fields.density import Density, DensitySolver
-from ..fields.momentum import Momentum
+from ..fields.body import Body
+from ..fields.density import Density
 from ..fields.state import State
-from ..loads.schedule import Loading
 from .controls import StaticsControls
 from .newton import Newton
 
@@ -49,11 +48,8 @@ class StaticLoading:
 
     Parameters
     ----------
-    momentum, density: the two fields.
-    free: (n*dim,) mask of the degrees of freedom that no grip holds.
-    motion: of the held ones, as a :class:`.Loading`, or as their velocity (n, dim) [mm/s]; then they are displaced by
-        velocity times t at load time t.
-    deletion: gamma at which an element fails.
+    body: the balances, and what loads it.
+    controls: options.
     """
 
     SOUND = 0.999   # least gamma of a body that is as good as intact
@@ -67,15 +63,11 @@ class StaticLoading:
     STALLED = 0.9  # factor of the changes of gamma a pass from which on the load is within 0.1 % of the onset
     LEAST = 1e-6  # part of the first increment at which a body without load is given up
 
-    def __init__(self, momentum: Momentum, density: DensitySolver, free: np.ndarray, motion: np.ndarray | Loading,
-                 controls: StaticsControls | None = None, deletion: float = 1e-6, threads: int = 1) -> None:
-        self.momentum, self.density, self.deletion = momentum, density, deletion
+    def __init__(self, body: Body, controls: StaticsControls | None = None) -> None:
+        self.body, self.momentum, self.density, self.loading = body, body.momentum, body.density, body.loading
         self.controls = controls or StaticsControls()
-        self.space = momentum.space
-        self.free = free
-        self.loading = Loading.of(self.space, free, motion)
-        self._size = float(np.ptp(self.space.X, axis=0).max())
-        self.newton = Newton(momentum, free, self.controls.tolerance, self.controls.max_newton, threads)
+        self.space, self.free = body.space, body.free
+        self.newton = Newton(self.momentum, self.free, self.controls.tolerance, self.controls.max_newton, body.threads)
         self.increment = 0.0      #: current load increment, as load time [s]; 0 before the first
         self.refused = ""         #: why the last increment was given up: "no equilibrium", "runs away", "passes",
         #: "softens" (the increment is too long to follow the load over its peak), "open" (too long for the ledger) or
@@ -108,7 +100,7 @@ class StaticLoading:
     def _longest(self, t: float) -> float:
         """The largest increment of the load time from `t` on, infinity if nothing moves up to the next knot [s]."""
         speed, pull, increment = self.loading.speed(t), self.loading.pull(t), self.controls.increment
-        by_grips = increment * self._size / speed if speed > 0.0 else np.inf
+        by_grips = increment * self.body.size / speed if speed > 0.0 else np.inf
         return min(by_grips, increment * 2.0 * self.momentum.material.shear_modulus / pull if pull > 0.0 else np.inf)
 
     def way(self, t: float) -> float:

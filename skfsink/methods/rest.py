@@ -14,11 +14,9 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import ParameterError
+from ..fields.body import Body
 from ..fields.crack import CRACKED
-from ..fields.density import DensitySolver
-from ..fields.momentum import Momentum
 from ..fields.state import State
-from ..loads.schedule import Loading
 from .controls import HHTControls
 from .hht import HHT
 
@@ -30,11 +28,8 @@ class LoadingFromRest:
 
     Parameters
     ----------
-    momentum, density: the two fields.
-    free: (n*dim,) mask of the degrees of freedom that no grip holds.
-    motion: of the held ones, as a :class:`.Loading` without ramps, or as their velocity (n, dim) [mm/s].
+    body: the balances, and grips without ramps.
     controls: options of the event; damping and mass are taken from it.
-    deletion: gamma at which an element fails.
 
     Attributes
     ----------
@@ -46,21 +41,18 @@ class LoadingFromRest:
     ITERATIONS = 200     # the coupling of the fields converges ever more slowly towards the limit load
     FAST = 100.0         # speed at which the event begins, in speeds of a grip; a body under load has a few
 
-    def __init__(self, momentum: Momentum, density: DensitySolver, free: np.ndarray, motion: np.ndarray | Loading,
-                 controls: HHTControls, deletion: float = 1e-6, threads: int = 1) -> None:
-        size = float(np.ptp(momentum.space.X, axis=0).max())
-        speed = Loading.of(momentum.space, free, motion).speed(0.0)
+    def __init__(self, body: Body, controls: HHTControls) -> None:
+        speed = body.loading.speed(0.0)
         if not speed > 0.0:
             raise ParameterError("start rest needs a grip that moves from the beginning on; all of them are still: "
                                  "give one a velocity, or take start onset")
         self._fast = self.FAST * speed
-        longest = max(self.INCREMENT * size / speed, 2 * controls.dt)
+        longest = max(self.INCREMENT * body.size / speed, 2 * controls.dt)
         self._last = controls.dt
-        self.integrator = HHT(momentum, density, free, motion, replace(
+        self.integrator = HHT(body, replace(
             controls, coupling="iterated", dt=longest, dt_first=0.0, force_tolerance=self.TOLERANCE,
             correction_tolerance=2 * self.TOLERANCE, gamma_tolerance=self.TOLERANCE, max_iterations=self.ITERATIONS),
-            deletion, threads)
-        self.integrator.loading = True
+            to_onset=True)
 
     @property
     def increment(self) -> float:

@@ -79,7 +79,7 @@ class Statics(StaticLoading):
             state.step += 1
             state.time = float(state.step)
             undeleted = self.momentum.effective(gamma, state.deleted)
-            delete_failed(self.space, state, self.deletion, self.density.failure_energy)
+            delete_failed(self.space, state, self.body.deletion, self.density.failure_energy)
             self.momentum.set_gamma(gamma, state.deleted)
             if dead is not None and loads is not None:
                 ledger.work += dead.changed(loads, state.u)

@@ -30,7 +30,7 @@ from .display import Display
 from .memory import check_memory
 from .model import AUTO, choose_model
 from .occupied import occupied
-from .simulate import Simulation, onset_copy
+from .simulate import Simulation
 from .summarize import summarize
 from .two_pass import corridor_report, lay_corridor
 
@@ -204,7 +204,7 @@ def _run_one(scene: Scene, folder: Path, display: Display, resume: bool, onset: 
         display.say(f"note: {text}")
     display.say(f"{scene.title}, mesh {scene.sample.name}: {space.n_elements} elements, {int(simulation.free.sum())} + "
                 f"{space.n_nodes} unknowns; {scene.controls.analysis} analysis in {folder}")
-    state = simulation.run() if onset is None else simulation.run(onset_copy(onset.state), onset.greatest)
+    state = simulation.run() if onset is None else simulation.run(onset.state.copy(), onset.greatest)
     display.phase("output")
     display.update(0.0, "")
     draw_run(scene, folder, "loading" if simulation.unfailed else "run", simulation.recorder.moments)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import dataclasses
 import time
 from collections.abc import Mapping
 from contextlib import closing
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,12 +13,10 @@ import numpy as np
 
 from ..errors import CheckpointError, Interrupted
 from ..fem.direct import one_thread_of_openblas
-from ..fields.density import DensitySolver
-from ..fields.energy import Ledger
-from ..fields.momentum import Momentum
+from ..fields.body import Body
 from ..fields.state import State
 from ..methods.explicit import Explicit
-from ..methods.hht import HHT
+from ..methods.integrators import INTEGRATORS, Integrator
 from ..methods.rest import LoadingFromRest
 from ..methods.statics import Statics
 from ..results.history import history_units
@@ -30,7 +28,7 @@ from .notes import Notes
 from .places import check_arrival, said
 from .recorder import Recorder
 
-__all__ = ["Simulation", "onset_copy"]
+__all__ = ["Simulation"]
 
 
 class Simulation:
@@ -63,21 +61,15 @@ class Simulation:
             path = folder / self.CHECKPOINT
             raise CheckpointError(f"the checkpoint {path} is damaged: it is a state without its run")
         self.scene, self.folder, self.display = scene, folder, display
-        c, space = scene.controls, scene.sample.space
-        self.loading = scene.loading()
-        self.free = self.loading.free
-        self.momentum = Momentum(space, scene.material, c.element, c.force_floor, c.workers(space.dim),
-                                 scene.regions)
-        self.momentum.dead = self.loading.dead
-        self.density = DensitySolver(space, scene.sink_law, c.sink, active_zone=c.active_zone,
-                                     regions=scene.regions)
-        self.statics = Statics(self.momentum, self.density, self.free, self.loading, c.statics, c.deletion,
-                               c.workers(space.dim))
+        self.body = Body.of(scene)
+        self.momentum, self.density, self.loading = self.body.momentum, self.body.density, self.body.loading
+        self.free = self.body.free
+        self.statics = Statics(self.body, scene.controls.statics)
         self.recorder = Recorder(scene, folder, self.momentum, self.density, self.loading,
                                  stored[2]["recorder"] if stored else None)
         self.notes = Notes(display.say, stored[2].get("warnings", []) if stored else [])
-        self.state = State.intact(space)
-        self.integrator: Explicit | HHT | None = None
+        self.state = State.intact(self.body.space)
+        self.integrator: Integrator | None = None
         self._from_rest: LoadingFromRest | None = None
         self.wall = {"loading": 0.0, "event": 0.0, "output": 0.0}
         self.counts = {"steps": 0, "gamma_solves": 0, "factorisations": 0}
@@ -158,29 +150,22 @@ class Simulation:
 
     def _adopt(self, onset: State) -> None:
         self.state = onset
-        self.momentum.set_time(onset.grip)
-        self.momentum.set_gamma(onset.gamma, onset.deleted)
-        reaction = self.momentum.force(onset.u)
+        reaction = self.body.take(onset)
         self.recorder.loading(onset, reaction)
         self.recorder.reached_onset(onset, reaction)
 
     def _begin_event(self) -> None:
         """Start a new ledger at the onset, from rest just past it unless the body has come there in motion."""
-        state, past = self.state, 0.0 if self._from_rest else self.scene.controls.overshoot
-        state.u *= 1.0 + past
-        state.grip = self.statics.past(state.grip, past)
-        state.time, state.step, state.phase = 0.0, 0, "event"
-        state.ledger = Ledger()
-        self.momentum.set_time(state.grip)
-        self.momentum.set_gamma(state.gamma, state.deleted)
-        reaction = self.momentum.force(state.u)
+        state, overshoot = self.state, 0.0 if self._from_rest else self.scene.controls.overshoot
+        state.begin_event(overshoot, self.statics.past(state.grip, overshoot))
+        reaction = self.body.take(state)
         if self.scene.controls.analysis == "quasistatic":
             state.ledger.elastic, state.ledger.loads = self.momentum.energy, self.momentum.loads
             state.ledger.initial = self.momentum.potential
         else:
             self.statics.newton.release()
-            if isinstance(self.integrator, HHT):
-                self.counts["factorisations"] += self.integrator.solver.count
+            if self.integrator is not None:
+                self.counts["factorisations"] += self.integrator.factorisations
             self._make_integrator()
             assert self.integrator is not None
             self.integrator.begin(state)
@@ -188,18 +173,14 @@ class Simulation:
         self.display.say(said(self.recorder.onset))
 
     def _make_integrator(self) -> None:
-        c, threads = self.scene.controls, self.scene.controls.workers(self.scene.sample.space.dim)
+        c = self.scene.controls
         if self.state.phase == "loading":
-            self._from_rest = LoadingFromRest(self.momentum, self.density, self.free, self.loading, c.hht,
-                                              c.deletion, threads)
+            self._from_rest = LoadingFromRest(self.body, c.hht)
             self.integrator = self._from_rest.integrator
-        elif c.integrator == "explicit":
-            explicit = Explicit(self.momentum, self.density, self.free, self.loading, c.explicit, c.deletion)
-            self.recorder.guard.step_share = lambda: explicit.step_share(self.state)
-            self.integrator = explicit
         else:
-            self.integrator = HHT(self.momentum, self.density, self.free, self.loading, c.hht, c.deletion,
-                                  threads)
+            self.integrator = INTEGRATORS[c.integrator](self.body, getattr(c, c.integrator))
+            if isinstance(self.integrator, Explicit):
+                self.recorder.guard.step_share = partial(self.integrator.step_share, self.state)
 
     def _integrate(self) -> None:
         state, integrator, recorder = self.state, self.integrator, self.recorder
@@ -272,8 +253,8 @@ class Simulation:
 
     def _solver_counts(self) -> dict[str, int]:
         factorisations = self.statics.factorisations + self.density.factorisations
-        if isinstance(self.integrator, HHT):
-            factorisations += self.integrator.solver.count
+        if self.integrator is not None:
+            factorisations += self.integrator.factorisations
         return {"gamma_solves": self.density.solves, "factorisations": factorisations}
 
     def cost(self) -> dict[str, Any]:
@@ -303,15 +284,4 @@ class Simulation:
             assert self.integrator is not None
             self.integrator.restore(state, memories["integrator"])
         else:
-            self.momentum.set_time(state.grip)
-            self.momentum.set_gamma(state.gamma, state.deleted)
-            self.momentum.force(state.u)
-
-
-def onset_copy(state: State) -> State:
-    """An independent copy of a loaded state, to start another analysis from."""
-    return dataclasses.replace(
-        state, u=state.u.copy(), v=state.v.copy(), a=state.a.copy(), gamma=state.gamma.copy(),
-        W_max=state.W_max.copy(), sink=None if state.sink is None else state.sink.copy(),
-        deleted=state.deleted.copy(), deletions=list(state.deletions),
-        ledger=dataclasses.replace(state.ledger))
+            self.body.take(state)

@@ -11,11 +11,11 @@ from ..errors import ParameterError, require
 from ..fields.density import SINKS
 from ..fields.momentum import ELEMENTS
 from ..methods.controls import ExplicitControls, HHTControls, StaticsControls
+from ..methods.integrators import INTEGRATORS
 
-__all__ = ["ANALYSES", "INTEGRATORS", "STARTS", "Controls", "choose"]
+__all__ = ["ANALYSES", "STARTS", "Controls", "choose"]
 
 ANALYSES = ("dynamic", "quasistatic", "both")
-INTEGRATORS = ("explicit", "hht")
 STARTS = ("onset", "rest")
 
 
@@ -73,7 +73,7 @@ class Controls:
 
     def __post_init__(self) -> None:
         choose("analysis", self.analysis, ANALYSES)
-        choose("integrator", self.integrator, INTEGRATORS)
+        choose("integrator", self.integrator, tuple(INTEGRATORS))
         choose("start", self.start, STARTS)
         if self.start == "rest" and self.analysis != "dynamic":
             raise ParameterError(f"start rest is for analysis dynamic; got {self.analysis}")

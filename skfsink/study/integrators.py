@@ -17,11 +17,11 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from ..methods.controls import ExplicitControls, HHTControls
-from .body import Body, Integrator, warm
 from .chart import draw_front, listed, page
 from .meshes import load_plate
 from .pareto import pareto_front
 from .part import Part, Planned, Points
+from .plate import Integrator, Plate, warm
 
 __all__ = ["ERRORS", "TIME", "Method", "errors"]
 
@@ -45,10 +45,10 @@ class Method:
         """About how long it takes [s]."""
         return 2.0 if isinstance(self.controls, ExplicitControls) else 2.0 + 0.4e-6 / self.controls.dt
 
-    def make(self, body: Body) -> Integrator:
-        """The integrator on a body."""
-        return (body.explicit(self.controls) if isinstance(self.controls, ExplicitControls) else
-                body.hht(self.controls))
+    def make(self, plate: Plate) -> Integrator:
+        """The integrator on a plate."""
+        return (plate.explicit(self.controls) if isinstance(self.controls, ExplicitControls) else
+                plate.hht(self.controls))
 
 
 def methods(quick: bool) -> list[Method]:
@@ -77,10 +77,10 @@ class _Run:
 
     def __call__(self) -> dict[str, Any]:
         warm(2)
-        body = _body(self.plate)
+        plate = _body(self.plate)
         if self.method is None:
-            return dict(body.onset_figures)
-        return (replace(body, exact=True) if self.exact else body).event(self.method.make)
+            return dict(plate.onset_figures)
+        return (replace(plate, exact=True) if self.exact else plate).event(self.method.make)
 
 
 def plan(quick: bool) -> list[Planned]:
@@ -97,8 +97,8 @@ def plan(quick: bool) -> list[Planned]:
 
 
 @cache
-def _body(plate: str) -> Body:
-    return Body(load_plate(plate))
+def _body(plate: str) -> Plate:
+    return Plate(load_plate(plate))
 
 
 # --- what comes out ---

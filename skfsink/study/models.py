@@ -16,10 +16,10 @@ import numpy as np
 from ..loads.grips import Grip
 from ..material import AAA
 from ..methods.controls import ExplicitControls, HHTControls
-from .body import PULLED, SLAB, SPEED, Body, Integrator, warm
 from .chart import page
 from .meshes import load_plate
 from .part import Part, Planned, Points
+from .plate import PULLED, SLAB, SPEED, Integrator, Plate, warm
 
 __all__ = ["MODEL", "Variant", "changes"]
 
@@ -30,7 +30,7 @@ SHEET = (Grip("top", (0.0, SPEED, 0.0)), Grip("back", (None, None, 0.0)), Grip("
 
 @dataclass(frozen=True)
 class Variant:
-    """A model: `body` are arguments of :class:`Body`, `controls` those of the integrator.
+    """A model: `body` are arguments of :class:`Plate`, `controls` those of the integrator.
 
     `mesh` is the name of a plate without its seed. The grips are those of a whole plate unless they are among `body`.
     `base` is the name of the variant it is compared with, empty for a base.
@@ -49,13 +49,13 @@ class Variant:
     def run(self, seed: str) -> dict[str, Any]:
         """Load the plate of that seed and let the crack run."""
         warm(2 if self.slab is None else 3)
-        body = Body(load_plate(self.mesh + seed, self.mirrored, self.slab), **{"grips": PULLED, **self.body})
-        onset = body.onset_figures
-        return {"onset": onset, **body.event(self._integrator)}
+        plate = Plate(load_plate(self.mesh + seed, self.mirrored, self.slab), **{"grips": PULLED, **self.body})
+        onset = plate.onset_figures
+        return {"onset": onset, **plate.event(self._integrator)}
 
-    def _integrator(self, body: Body) -> Integrator:
+    def _integrator(self, plate: Plate) -> Integrator:
         c = self.controls
-        return body.explicit(c) if isinstance(c, ExplicitControls) else body.hht(c)
+        return plate.explicit(c) if isinstance(c, ExplicitControls) else plate.hht(c)
 
 
 def variants(quick: bool) -> list[Variant]:

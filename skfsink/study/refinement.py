@@ -15,10 +15,10 @@ from matplotlib.axes import Axes
 
 from ..meshing.sample import Sample, load_sample
 from ..meshing.sweeping import swept
-from .body import PULLED, SLAB, Body, warm
 from .chart import draw_front, page
 from .meshes import refined
 from .part import Part, Planned, Points
+from .plate import PULLED, SLAB, Plate, warm
 from .rates import extrapolated, observed_rate
 
 __all__ = ["SPACE", "limits"]
@@ -80,11 +80,11 @@ class _Load:
     def __call__(self) -> dict[str, Any]:
         warm(2 if self.kind == "quads" else 3)
         sample = plate(self.mesh, self.kind)
-        body = Body(sample, PULLED if self.kind == "quads" else SLAB, element=self.element, onset_tolerance=2e-5)
-        held = body.held_at(OPENING)
+        pulled = Plate(sample, PULLED if self.kind == "quads" else SLAB, element=self.element, onset_tolerance=2e-5)
+        held = pulled.held_at(OPENING)
         return {"h_mm": size(self.mesh), "elements": sample.space.n_elements,
-                "unknowns": int(body.constraints[0].sum()) + sample.space.n_nodes, "held": held,
-                "onset": body.onset_figures, "cpu_s": body.onset_figures["loading_cpu_s"]}
+                "unknowns": int(pulled.body.free.sum()) + sample.space.n_nodes, "held": held,
+                "onset": pulled.onset_figures, "cpu_s": pulled.onset_figures["loading_cpu_s"]}
 
 
 # --- what comes out ---

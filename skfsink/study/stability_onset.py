@@ -11,34 +11,33 @@ from matplotlib.axes import Axes
 
 from ..fields.deletion import delete_failed
 from ..fields.density import DensitySolver
-from ..fields.energy import Ledger
 from ..fields.state import State
 from ..loads.grips import Grip
 from ..methods.controls import StaticsControls
 from ..methods.statics import Statics
 from ..pictures.plot import BLUE, RED, SAND
 from .blocks import block
-from .body import SPEED, Body
 from .part import Planned, Points
+from .plate import SPEED, Plate
 
 __all__ = ["draw_length", "draw_notch", "draw_staggering", "draw_unconverged", "length", "notch", "passes",
            "plan_length", "plan_notch", "plan_staggering", "plan_unconverged", "staggering", "unconverged"]
 
 
 @cache
-def _plate() -> Body:
-    return Body(block(15, notch=0.4, width=0.06))
+def _plate() -> Plate:
+    return Plate(block(15, notch=0.4, width=0.06))
 
 
-def _statics(body: Body, **controls: Any) -> Statics:
-    return Statics(body.momentum, body.density, *body.constraints, StaticsControls(**controls))
+def _statics(plate: Plate, **controls: Any) -> Statics:
+    return Statics(plate.body, StaticsControls(**controls))
 
 
 # --- the iterated staggering ---
 def staggering() -> dict[str, Any]:
     """Factor a pass by which the change of gamma falls, and least gamma, as the load nears the onset."""
-    body = _plate()
-    statics, state = _statics(body, onset_tolerance=1e-6, max_passes=2000), State.intact(body.sample.space)
+    plate = _plate()
+    statics, state = _statics(plate, onset_tolerance=1e-6, max_passes=2000), State.intact(plate.sample.space)
     load, factor, least = [], [], []
     for _ in statics.load(state):
         load.append(state.grip)
@@ -49,8 +48,8 @@ def staggering() -> dict[str, Any]:
 
 def passes(most: int) -> dict[str, Any]:
     """Opening at the onset [mm] that is found when an increment is given up after `most` passes, and the reason."""
-    body = _plate()
-    statics, state = _statics(body, max_passes=most), State.intact(body.sample.space)
+    plate = _plate()
+    statics, state = _statics(plate, max_passes=most), State.intact(plate.sample.space)
     for _ in statics.load(state):
         pass
     return {"passes": most, "opening": state.grip * 2e-3, "refused": statics.refused, "newton": statics.newton_steps}
@@ -91,13 +90,13 @@ def unconverged(increments: int, steps: int, share: float = 0.95) -> dict[str, A
     Each of the `increments` moves the grips alone, then makes `steps` full Newton steps (-1: to the equilibrium), and
     then updates history, gamma and deletions, as a sweep does. The solid should be all but intact.
     """
-    body = _plate()
-    target, statics, space = share * body.onset.grip, _statics(body), body.sample.space
-    state, newton, momentum = State.intact(space), statics.newton, body.momentum
-    density = DensitySolver(space, body.law)  # that of the body remembers another history
+    plate = _plate()
+    target, statics, space = share * plate.onset.grip, _statics(plate), plate.sample.space
+    state, newton, momentum = State.intact(space), statics.newton, plate.momentum
+    density = DensitySolver(space, plate.law)  # that of the plate remembers another history
     momentum.set_gamma(state.gamma, state.deleted)
     for done in range(1, increments + 1):
-        state.u += body.constraints[1] * target / increments
+        state.u += plate.body.loading.velocity(0.0) * target / increments
         if steps < 0:
             state.u, _ = newton.equilibrium(state.u)
         for _ in range(max(steps, 0)):
@@ -108,16 +107,16 @@ def unconverged(increments: int, steps: int, share: float = 0.95) -> dict[str, A
         state.W_max = np.maximum(state.W_max, momentum.W)
         state.gamma = density.solve(state.W_max, state.gamma)
         state.time = float(done)
-        delete_failed(space, state, body.deletion, body.law.failure_energy)
+        delete_failed(space, state, plate.deletion, plate.law.failure_energy)
         momentum.set_gamma(state.gamma, state.deleted)
         if state.gamma.max() < 0.5:  # nothing is left that could be solved for
             break
-    return {"increments": increments, "steps": steps, "lost": _lost(body, state), "done": done,
+    return {"increments": increments, "steps": steps, "lost": _lost(plate, state), "done": done,
             "deleted": float(state.deleted.mean()), "least": float(state.gamma.min())}
 
 
-def _lost(body: Body, state: State) -> float:
-    return 1 - float(body.density.load @ state.gamma) / float(body.density.load.sum())
+def _lost(plate: Plate, state: State) -> float:
+    return 1 - float(plate.density.load @ state.gamma) / float(plate.density.load.sum())
 
 
 def plan_unconverged(quick: bool) -> list[Planned]:
@@ -149,9 +148,9 @@ def notch(n: int, width: float) -> dict[str, Any]:
 
     `tip_mm` is how far from the end of the notch gamma is least.
     """
-    body = Body(block(n, notch=0.4, width=width, rounded=width > 0), ROLLERS)
-    X, weakest = body.sample.space.X, np.argmin(body.onset.gamma)
-    return {"n": n, "width": width, "h": 1 / n, **body.onset_figures,
+    plate = Plate(block(n, notch=0.4, width=width, rounded=width > 0), ROLLERS)
+    X, weakest = plate.sample.space.X, np.argmin(plate.onset.gamma)
+    return {"n": n, "width": width, "h": 1 / n, **plate.onset_figures,
             "tip_mm": float(np.linalg.norm(X[weakest] - (0.4, 0.5)))}
 
 
@@ -178,15 +177,13 @@ def length(per_length: float, n: int) -> dict[str, Any]:
 
     U and D, when less than a thousandth of the energy is left.
     """
-    body = Body(block(n, notch=0.2, width=0.2, rounded=True), ROLLERS)
-    state = body.onset
-    state.u *= 1.005
-    state.grip *= 1.005
-    state.time, state.step, state.phase, state.ledger = 0.0, 0, "event", Ledger()
-    for _ in body.statics().propagate(state):
+    plate = Plate(block(n, notch=0.2, width=0.2, rounded=True), ROLLERS)
+    state = plate.onset
+    state.begin_event(0.005)
+    for _ in plate.statics().propagate(state):
         if state.ledger.elastic < 1e-3 * state.ledger.initial:
             break
-    return {"l_over_h": per_length, "n": n, **body.onset_figures, "U": state.ledger.paper, "D": state.ledger.sink,
+    return {"l_over_h": per_length, "n": n, **plate.onset_figures, "U": state.ledger.paper, "D": state.ledger.sink,
             "passes": state.step, "grip": state.grip * 2e-3, "balance": state.ledger.error(state.ledger.initial)}
 
 

@@ -10,18 +10,19 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from ..fem.pattern import Pattern
+from ..fields.body import Body
 from ..fields.density import DensitySolver
-from ..fields.energy import Ledger
 from ..fields.momentum import Momentum
 from ..fields.state import State
+from ..loads.schedule import Loading
 from ..material import AAA, SinkLaw
 from ..methods.controls import ExplicitControls, HHTControls
 from ..methods.explicit import Explicit
 from ..methods.frequency import highest_frequency
 from ..pictures.plot import BLUE, RED, SAND
 from .blocks import block, surface
-from .body import Body
 from .part import Planned, Points
+from .plate import Plate
 
 __all__ = ["amplification", "deletion", "draw_alpha", "draw_deletion", "draw_explicit", "draw_hht", "explicit",
            "growth", "long_steps", "plan_alpha", "plan_deletion", "plan_explicit", "plan_hht"]
@@ -48,7 +49,8 @@ def resting(kind: str) -> tuple[Momentum, DensitySolver, np.ndarray, State]:
 def explicit(kind: str, courant: float) -> dict[str, Any]:
     """Growth a step of a disturbance of 1e-8 mm at a fixed step of `courant` times the predicted limit."""
     momentum, density, free, state = resting(kind)
-    scheme = Explicit(momentum, density, free, np.zeros_like(state.u), ExplicitControls(gamma_every=10**6))
+    scheme = Explicit(Body(momentum, density, Loading.steady(momentum.space, free, np.zeros_like(state.u))),
+                      ExplicitControls(gamma_every=10**6))
     scheme.begin(state)
     omega, _ = highest_frequency(momentum, Pattern(momentum.space, 2, free, upper=True), free, state.u, scheme.mass,
                                  tolerance=1e-8)
@@ -96,31 +98,29 @@ def draw_explicit(axes: Sequence[Axes], points: Points) -> None:
 
 # --- HHT: long steps through the instability; deletion ---
 @cache
-def plate(force_floor: float = 1e-3, threshold: float = 1e-6) -> Body:
+def plate(force_floor: float = 1e-3, threshold: float = 1e-6) -> Plate:
     """A block of 15 x 15 elements with a notch of 0.4 mm one element wide, h = l/1.5."""
-    return Body(block(15, notch=0.4, width=0.06), force_floor=force_floor, deletion=threshold, overshoot=0.01)
+    return Plate(block(15, notch=0.4, width=0.06), force_floor=force_floor, deletion=threshold, overshoot=0.01)
 
 
-def _started(body: Body) -> State:
-    state = body.onset
-    state.u *= 1 + body.overshoot
-    state.grip *= 1 + body.overshoot
-    state.time, state.step, state.phase, state.ledger = 0.0, 0, "event", Ledger()
+def _started(notched: Plate) -> State:
+    state = notched.onset
+    state.begin_event(notched.overshoot)
     return state
 
 
 def long_steps(dt_us: float, guarded: bool, end_us: float = 20.0) -> dict[str, Any]:
     """Share of the elements that failed, and the energy taken, `end_us` after the onset with steps of up to `dt_us`."""
-    body = plate()
-    state = _started(body)
-    hht = body.hht(HHTControls(dt=dt_us * 1e-6))
+    notched = plate()
+    state = _started(notched)
+    hht = notched.hht(HHTControls(dt=dt_us * 1e-6))
     if not guarded:
-        hht._failing_step = np.inf
+        hht.scheme.failing_step = np.inf
     hht.begin(state)
     for _ in hht.run(state, end_us * 1e-6):
         pass
     return {"dt_us": dt_us, "guarded": guarded, "deleted": float(state.deleted.mean()),
-            "lost_density": 1 - float(body.density.load @ state.gamma) / float(body.density.load.sum()),
+            "lost_density": 1 - float(notched.density.load @ state.gamma) / float(notched.density.load.sum()),
             "sink": state.ledger.sink / state.ledger.initial, "steps": state.step, "rejected": hht.rejected,
             "numerical": state.ledger.numerical / state.ledger.initial,
             "balance": state.ledger.error(state.ledger.initial)}
@@ -148,9 +148,9 @@ def draw_hht(axes: Sequence[Axes], points: Points) -> None:
 
 def deletion(threshold: float, force_floor: float, end_us: float = 20.0) -> dict[str, Any]:
     """Energy in elements at the moment they were deleted, of that of the onset, in an explicit event."""
-    body = plate(force_floor, threshold)
-    state = _started(body)
-    scheme = body.explicit(ExplicitControls())
+    notched = plate(force_floor, threshold)
+    state = _started(notched)
+    scheme = notched.explicit(ExplicitControls())
     scheme.begin(state)
     for _ in scheme.run(state, end_us * 1e-6):
         pass

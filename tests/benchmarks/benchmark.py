@@ -27,6 +27,7 @@ from typing import Any
 
 import numpy as np
 import skfem
+from bodies import held_body
 from limits import FORCE_BYTES, STEP_BYTES, limits, reached
 
 from skfsink.fem import kernels
@@ -116,7 +117,7 @@ def step() -> dict[str, Any]:
 def _steps(threads: int) -> dict[str, Any]:
     sample = load_sample("single_edge_notch", "M4")
     momentum, density, state, free, velocity = _cracked(sample, threads)
-    integrator = Explicit(momentum, density, free, velocity)
+    integrator = Explicit(held_body(momentum, density, free, velocity))
     integrator.begin(state)
     points = sample.space.w.size
 

@@ -1,4 +1,4 @@
-"""A body loaded to its onset once, from which the events of a study start; nothing is written to disk."""
+"""A notched plate loaded to its onset once, from which the events of a study start; nothing is written to disk."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import ConvergenceError, InstabilityError
+from ..fields.body import Body
 from ..fields.density import Density, DensitySolver
-from ..fields.energy import Ledger
 from ..fields.momentum import Momentum
 from ..fields.state import State
 from ..loads.grips import Grip
@@ -22,14 +22,13 @@ from ..methods.controls import ExplicitControls, HHTControls, StaticsControls
 from ..methods.explicit import Explicit
 from ..methods.hht import HHT
 from ..methods.statics import Statics
-from ..run.simulate import onset_copy
 from ..scene.scene import Scene
 from .meshes import load_plate
 
-__all__ = ["PULLED", "SLAB", "SPEED", "Body", "Front", "Integrator", "Make", "first_passages", "warm"]
+__all__ = ["PULLED", "SLAB", "SPEED", "Front", "Integrator", "Make", "Plate", "first_passages", "warm"]
 
 Integrator = Explicit | HHT
-Make = Callable[["Body"], Integrator]
+Make = Callable[["Plate"], Integrator]
 
 SPEED = 1e-3  # of a grip [mm/s]; it only sets the clock of the loading
 #: both ends of a plate move apart and are held sideways
@@ -47,7 +46,7 @@ class _Exact(DensitySolver):
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
+class Plate:
     """A notched plate between grips, and how it is modelled.
 
     Parameters
@@ -79,34 +78,35 @@ class Body:
         return Scene("study", "study", {}, self.sample, self.material, self.law, self.grips)
 
     @cached_property
-    def constraints(self) -> tuple[np.ndarray, np.ndarray]:
-        """Free degrees of freedom (n*dim,), velocity of the held ones (n, dim)."""
-        return self.scene.constraints()
+    def body(self) -> Body:
+        """Its balances, and what loads it."""
+        momentum = Momentum(self.sample.space, self.material, self.element, self.force_floor)
+        density = (_Exact if self.exact else DensitySolver)(self.sample.space, self.law, self.sink)
+        return Body(momentum, density, self.scene.loading(), self.deletion)
 
-    @cached_property
+    @property
     def momentum(self) -> Momentum:
-        """The displacement field."""
-        return Momentum(self.sample.space, self.material, self.element, self.force_floor)
+        """The balance of momentum."""
+        return self.body.momentum
 
-    @cached_property
+    @property
     def density(self) -> DensitySolver:
-        """The relative density."""
-        return (_Exact if self.exact else DensitySolver)(self.sample.space, self.law, self.sink)
+        """The balance of mass."""
+        return self.body.density
 
     def held_at(self, opening: float) -> dict[str, float]:
         """:meth:`figures` of the intact plate in equilibrium at an opening of the grips [mm]."""
         state, statics = State.intact(self.sample.space), self.statics()
         state.grip = opening / (2 * SPEED)
         self.momentum.set_gamma(state.gamma, state.deleted)
-        move = self.constraints[1] * state.grip
+        move = self.body.loading.velocity(0.0) * state.grip
         state.u, _ = statics.newton.equilibrium(statics.newton.predict(state.u, move))
         statics.newton.release()
         return self.figures(state)
 
     def statics(self) -> Statics:
         """A new solver of equilibria."""
-        return Statics(self.momentum, self.density, *self.constraints,
-                       StaticsControls(onset_tolerance=self.onset_tolerance), self.deletion)
+        return Statics(self.body, StaticsControls(onset_tolerance=self.onset_tolerance))
 
     def figures(self, state: State) -> dict[str, float]:
         """Opening of the grips [mm], force on the first [N/mm], elastic energy [N mm/mm] of the whole plate."""
@@ -137,7 +137,7 @@ class Body:
     @property
     def onset(self) -> State:
         """A copy of the state at the onset, found once."""
-        return onset_copy(self._loaded[0])
+        return self._loaded[0].copy()
 
     @property
     def onset_figures(self) -> dict[str, float]:
@@ -145,12 +145,12 @@ class Body:
         return self._loaded[1]
 
     def explicit(self, controls: ExplicitControls) -> Explicit:
-        """The explicit integrator of this body."""
-        return Explicit(self.momentum, self.density, *self.constraints, controls, self.deletion)
+        """The explicit integrator of this plate."""
+        return Explicit(self.body, controls)
 
     def hht(self, controls: HHTControls) -> HHT:
-        """The implicit integrator of this body."""
-        return HHT(self.momentum, self.density, *self.constraints, controls, self.deletion)
+        """The implicit integrator of this plate."""
+        return HHT(self.body, controls)
 
     def event(self, make: Make, run: float = 1.0, places: int = 20, limit: float = 1.5e-4) -> dict[str, Any]:
         """Let the crack run from just past the onset until its tip has gone `run` [mm].
@@ -169,9 +169,7 @@ class Body:
             The ledger is open, or energy was fed in, by more than 5 % of that of the onset.
         """
         state = self.onset
-        state.u *= 1 + self.overshoot
-        state.grip *= 1 + self.overshoot
-        state.time, state.step, state.phase, state.ledger = 0.0, 0, "event", Ledger()
+        state.begin_event(self.overshoot)
         integrator = make(self)
         front = Front(self.sample)
         integrator.begin(state)
@@ -244,7 +242,7 @@ def first_passages(times: Sequence[float] | np.ndarray, way: np.ndarray, marks: 
 @cache
 def warm(dim: int) -> None:
     """Compile or load all that runs need, so that the first one that is measured is not charged for it."""
-    body = Body(load_plate("plate0", slab=None if dim == 2 else (0.05, 1)), PULLED if dim == 2 else SLAB)
-    body.event(lambda body: body.explicit(ExplicitControls()), run=0.05)
+    plate = Plate(load_plate("plate0", slab=None if dim == 2 else (0.05, 1)), PULLED if dim == 2 else SLAB)
+    plate.event(lambda plate: plate.explicit(ExplicitControls()), run=0.05)
     if dim == 2:
-        body.event(lambda body: body.hht(HHTControls()), run=0.05)
+        plate.event(lambda plate: plate.hht(HHTControls()), run=0.05)

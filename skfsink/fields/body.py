@@ -1,0 +1,79 @@
+"""The body that every method works on: its balances of momentum and mass, and what loads it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..errors import ParameterError
+from ..fem.space import Space
+from ..loads.schedule import Loading
+from .density import DensitySolver
+from .momentum import Momentum
+from .state import State
+
+__all__ = ["Body"]
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A body and what is done to it.
+
+    Memory: that of its momentum balance, which is at the density and load time last given to it; see :meth:`take`.
+
+    Parameters
+    ----------
+    momentum, density: the balances of momentum and of mass.
+    loading: what is held, moved and pulled at each load time.
+    deletion: gamma at which an element fails.
+    threads: that share factorisations and loops over elements.
+
+    Raises
+    ------
+    ParameterError
+        The momentum balance has other dead loads than the loading.
+    """
+
+    momentum: Momentum
+    density: DensitySolver
+    loading: Loading
+    deletion: float = 1e-6
+    threads: int = 1
+
+    def __post_init__(self) -> None:
+        if self.momentum.dead is not self.loading.dead:
+            raise ParameterError("the momentum balance has other dead loads than the loading: give it `loading.dead`")
+
+    @classmethod
+    def of(cls, scene: Any) -> Body:
+        """The body of a :class:`.Scene`."""
+        controls, space, loading = scene.controls, scene.sample.space, scene.loading()
+        threads = controls.workers(space.dim)
+        momentum = Momentum(space, scene.material, controls.element, controls.force_floor, threads, scene.regions,
+                            dead=loading.dead)
+        density = DensitySolver(space, scene.sink_law, controls.sink, active_zone=controls.active_zone,
+                                regions=scene.regions)
+        return cls(momentum, density, loading, controls.deletion, threads)
+
+    @property
+    def space(self) -> Space:
+        """The spaces."""
+        return self.momentum.space
+
+    @property
+    def free(self) -> np.ndarray:
+        """Mask of the degrees of freedom that nothing holds, (n*dim,)."""
+        return self.loading.free
+
+    @property
+    def size(self) -> float:
+        """Greatest extent along an axis [mm]."""
+        return float(np.ptp(self.space.X, axis=0).max())
+
+    def take(self, state: State) -> np.ndarray:
+        """Bring the momentum balance to load time, density and displacement of a state; its force less dead loads."""
+        self.momentum.set_time(state.grip)
+        self.momentum.set_gamma(state.gamma, state.deleted)
+        return self.momentum.force(state.u)

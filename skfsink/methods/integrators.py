@@ -1,0 +1,50 @@
+"""The integrators in time by name: adding one is its class, and a line in `INTEGRATORS`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any, Protocol
+
+import numpy as np
+
+from ..fields.body import Body
+from ..fields.state import State
+from .explicit import Explicit
+from .hht import HHT
+
+__all__ = ["INTEGRATORS", "Integrator"]
+
+
+class Integrator(Protocol):
+    """What a run asks of an integrator: it advances a :class:`.State` in place."""
+
+    @property
+    def dt(self) -> float:
+        """Size of the step [s], a column of the history."""
+
+    @property
+    def reaction(self) -> np.ndarray:
+        """Internal force less the dead loads (n, dim) at the current displacement."""
+
+    @property
+    def factorisations(self) -> int:
+        """Numerical factorisations made so far."""
+
+    def begin(self, state: State) -> None:
+        """At the start of the event: velocities, accelerations, and the ledger's first energies."""
+
+    def run(self, state: State, t_end: float) -> Iterator[State]:
+        """One accepted step, then `yield state`, until `t_end` [s]."""
+
+    def sync(self, state: State) -> None:
+        """Bring the state up to date, if parts of it are kept elsewhere."""
+
+    def memory(self) -> dict[str, np.ndarray]:
+        """Arrays by name, for a checkpoint."""
+
+    def restore(self, state: State, memory: dict[str, np.ndarray]) -> None:
+        """Go on with the same bits where :meth:`memory` was taken."""
+
+
+#: makers of an integrator by name, from the body and the options of that name in :class:`.Controls`
+INTEGRATORS: dict[str, Callable[[Body, Any], Integrator]] = {"explicit": Explicit, "hht": HHT}
