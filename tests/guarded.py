@@ -8,12 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from skfsink.fields.momentum import Momentum
+from skfsink.errors import Interrupted
+from skfsink.fields.body import Body
 from skfsink.fields.state import State
 from skfsink.material import AAA, SinkLaw
 from skfsink.meshing.sample import Sample
 from skfsink.run.display import Display
-from skfsink.run.guard import Guard
+from skfsink.run.observers.crack import tracker_of
+from skfsink.run.observers.guard import Guard
+from skfsink.run.observers.observer import Observer
+from skfsink.run.observers.view import View
 from skfsink.run.simulate import Simulation
 from skfsink.scene.controls import Controls
 from skfsink.scene.scene import Scene
@@ -36,11 +40,12 @@ class Watched:
 
     def __init__(self, of: Scene | None = None, stretch: float = 0.01) -> None:
         self.scene = of or scene()
-        space = self.scene.sample.space
-        self.momentum = Momentum(space, self.scene.material, self.scene.controls.element)
-        self.guard = Guard(self.scene, self.momentum)
+        space, body = self.scene.sample.space, Body.of(self.scene)
+        self.momentum, self.guard, self.state = body.momentum, Guard(1e-6), State.intact(space)
+        tracker = tracker_of(self.scene, body)
+        self.view = View(self.scene, Path(), body, tracker, tracker.nothing(), self.state)
+        self.guard.open(self.view)
         self.guard.scale = 1.0
-        self.state = State.intact(space)
         self.state.phase = "event"
         self.state.u = space.X * (np.array([1 / (1 + stretch), 1 + stretch]) - 1)
         self.state.ledger.initial = self.state.ledger.elastic = 1.0
@@ -52,10 +57,26 @@ class Watched:
         self.momentum.force(self.state.u)
 
 
-def simulation(of: Scene, folder: Path) -> Simulation:
+class Stop(Observer):
+    """Stops a run between two steps, with a checkpoint, as Ctrl-C does after a number of steps."""
+
+    def __init__(self, after: int) -> None:
+        self.left = after
+
+    def due(self, view: View) -> bool:
+        return False
+
+    def pause(self, view: View) -> None:
+        self.left -= 1
+        if self.left == 0:
+            view.save()
+            raise Interrupted("stopped")
+
+
+def simulation(of: Scene, folder: Path, *observers: Observer) -> Simulation:
     """A run of a scene in a folder."""
     folder.mkdir(exist_ok=True)
-    return Simulation(of, folder, Display(True))
+    return Simulation(of, folder, Display(True), observers=observers)
 
 
 def event(folder: Path, **controls: Any) -> Simulation:

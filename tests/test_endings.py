@@ -19,7 +19,7 @@ from skfsink.fields.state import State
 from skfsink.material import AAA, SinkLaw
 from skfsink.methods.controls import ExplicitControls, HHTControls
 from skfsink.methods.statics import Statics
-from skfsink.run.simulate import Simulation
+from skfsink.run.simulate import Loaded, Simulation
 from skfsink.scene.controls import Controls
 from skfsink.scene.scene import Scene
 from skfsink.study.blocks import block
@@ -46,11 +46,11 @@ def ends_well(of: Scene, state: State, folder: Path) -> None:
         state.ledger.elastic = state.ledger.work = momentum.energy
         sim: Simulation = simulation(of, folder)
         try:
-            sim.run(state)
+            sim.run(Loaded(state))
         except SkfsinkError as error:
             assert str(error) and "\n" not in str(error)
             return
-    ledger, allowed = sim.state.ledger, of.controls.balance_tolerance * sim.recorder.guard.scale
+    ledger, allowed = sim.state.ledger, of.controls.balance_tolerance * sim.guard.scale
     assert all(np.isfinite(value) for value in ledger.as_dict().values())
     assert abs(ledger.balance) <= allowed and -ledger.numerical <= allowed
     for name in ("u", "v", "a", "gamma", "W_max"):

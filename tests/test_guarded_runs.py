@@ -19,7 +19,7 @@ from skfsink.methods.controls import ExplicitControls, HHTControls, StaticsContr
 from skfsink.methods.explicit import Explicit
 from skfsink.methods.statics import Statics
 from skfsink.run.display import Display
-from skfsink.run.simulate import Simulation
+from skfsink.run.simulate import Loaded, Simulation
 from skfsink.run.summarize import summarize
 from skfsink.study.plate import Plate
 
@@ -34,14 +34,14 @@ def test_too_long_a_step_stops_the_run_with_the_cure(tmp_path: Path, monkeypatch
     monkeypatch.setattr(Explicit, "_set_step", longer)
     sim = event(tmp_path)
     with np.errstate(all="ignore"), pytest.raises(InstabilityError, match=r"energy fed in .* lower --courant"):
-        sim.run(NOTCHED.onset)
+        sim.run(Loaded(NOTCHED.onset))
     assert np.isfinite(sim.state.u).all() and sim.state.gamma.min() > 0.0
 
 
 def test_run_keeps_its_warnings(tmp_path: Path):
     """Fails if summary.json does not list what was warned of, or a resumed run forgets it."""
     sim = event(tmp_path, sink="consistent")
-    sim.run(NOTCHED.onset)
+    sim.run(Loaded(NOTCHED.onset))
     expected = [SHARP, "the consistent sink varies by more than 1e3", r"falls to -0.\d+: the consistent sink"]
     for texts in (summarize(sim.scene, sim)["warnings"],
                   Simulation(sim.scene, tmp_path, Display(True), resume=True).notes.texts):
@@ -53,7 +53,7 @@ def test_run_keeps_its_warnings(tmp_path: Path):
 def test_long_hht_steps_are_cut_and_said_so(tmp_path: Path):
     """Fails if a step in which a crack runs through is taken, or cut without a word."""
     sim = event(tmp_path, integrator="hht", hht=HHTControls(dt=1e-5), event_time=2e-5)
-    sim.run(NOTCHED.onset)
+    sim.run(Loaded(NOTCHED.onset))
     assert any("would let a crack run through at once" in text for text in sim.notes.texts)
     assert sim.state.deleted.mean() < 0.15
 

@@ -19,6 +19,7 @@ from skfsink.material import AAA
 from skfsink.meshing.sample import Sample
 from skfsink.methods.controls import ExplicitControls, HHTControls
 from skfsink.run.notes import Notes
+from skfsink.run.observers.range import check_scene
 from skfsink.scene.scene import Scene
 from skfsink.study.blocks import block
 
@@ -80,7 +81,7 @@ def squeezed(share: float) -> Sample:
 def test_scene_beyond_the_methods_is_warned_of(of: Callable[[], Scene], message: str | None,
                                                caplog: pytest.LogCaptureFixture):
     """Fails if a guard before the run is gone, speaks within the range of the methods, or names no cure."""
-    Watched(of()).guard.check_scene()
+    check_scene(of())
     assert len(caplog.messages) == (message is not None)
     if message:
         assert re.search(message, caplog.messages[0]), caplog.messages

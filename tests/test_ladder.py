@@ -8,11 +8,12 @@ import json
 import tomllib
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
 from bodies import held_body
+from guarded import Stop
 from plates import invoke, plate
 from references import scene_of
 
@@ -78,7 +79,7 @@ def test_a_half_has_the_onset_of_the_whole(tmp_path: Path) -> None:
         scene = with_options("single_edge_notch", "coarse-mirror", half=half, event_time=1e-9)
         simulation = Simulation(scene, tmp_path, Display(quiet=True))
         simulation.run()
-        found[half] = measured(scene, simulation.recorder), \
+        found[half] = measured(scene, simulation), \
             simulation.state.ledger.initial * scene.whole.energy
     for name in ("onset_load", "onset_displacement"):
         assert found[True][0][name] == pytest.approx(found[False][0][name], rel=1e-3)
@@ -145,20 +146,6 @@ def small(folder: Path, start: str) -> Scene:
         length_scale=0.6, start=start, event_time=2e-5, overshoot=1e-3))
 
 
-class Stops(Display):
-    """A display that interrupts a run after some updates."""
-
-    def __init__(self, after: int) -> None:
-        super().__init__(quiet=True)
-        self.left, self.simulation = after, cast(Simulation, None)
-
-    def update(self, fraction: float, figures: str) -> None:
-        """Count down, then ask for the end."""
-        self.left -= 1
-        if self.left == 0:
-            self.simulation._interrupt.received = True
-
-
 def test_a_start_from_rest_goes_on_where_it_was_stopped(tmp_path: Path) -> None:
     """Fails if the loading from rest forgets its step, its rates or its inertia in a checkpoint."""
     scene, files = small(tmp_path, "rest"), []
@@ -166,11 +153,10 @@ def test_a_start_from_rest_goes_on_where_it_was_stopped(tmp_path: Path) -> None:
         folder = tmp_path / name
         folder.mkdir()
         for number, after in enumerate(stops):
-            display = Stops(after)
-            display.simulation = Simulation(scene, folder, display, resume=number > 0)
+            run = Simulation(scene, folder, Display(quiet=True), resume=number > 0, observers=[Stop(after)])
             with pytest.raises(Interrupted):
-                display.simulation.run()
-        assert display.simulation.state.phase == "loading" and display.simulation.state.step == 14
+                run.run()
+        assert run.state.phase == "loading" and run.state.step == 14
         files.append((folder / "history.csv").read_bytes())
     assert files[0] == files[1]
 
@@ -186,14 +172,14 @@ def test_a_start_from_rest_comes_to_the_static_onset_in_motion(tmp_path: Path) -
         folder.mkdir()
         simulation = Simulation(scene, folder, Display(quiet=True))
         state = simulation.run()
-        found[start] = simulation.recorder.onset["displacement_mm"]
+        found[start] = simulation.onset.figures["displacement_mm"]
         assert abs(state.ledger.balance) < 1e-9 * state.ledger.initial
-        first = simulation.recorder.history.rows[len([r for r in simulation.recorder.history.rows
+        first = simulation.history.rows[len([r for r in simulation.history.rows
                                                       if r["phase"] == "loading"])]
         if start == "rest":
-            assert simulation.recorder.onset["gamma_min"] > 0.8
+            assert simulation.onset.figures["gamma_min"] > 0.8
             assert first["kinetic"] > 0 and first["time_s"] == 0.0
-            assert simulation.counts["factorisations"] > 20
+            assert simulation.costs.factorisations > 20
     assert found["rest"] == pytest.approx(found["onset"], rel=2e-3)
     with pytest.raises(ParameterError, match="start rest is for analysis dynamic"):
         Options(start="rest", analysis="both")
@@ -206,10 +192,10 @@ def test_a_fast_start_from_rest_ends_when_the_sample_has_come_apart(tmp_path: Pa
                     controls=replace(scene.controls, event_time=2e-4))
     simulation = Simulation(scene, tmp_path, Display(quiet=True))
     state = simulation.run()
-    loading = [row for row in simulation.recorder.history.rows if row["phase"] == "loading"]
+    loading = [row for row in simulation.history.rows if row["phase"] == "loading"]
     assert min(row["gamma_min"] for row in loading[:-1]) > CRACKED
-    assert simulation.recorder.tracker.separated and state.phase == "done"
-    assert simulation.recorder.gauge.displacement(state) < 3.0
+    assert simulation.crack.tracker.separated and state.phase == "done"
+    assert simulation.view.gauge.displacement(state) < 3.0
 
 
 def test_a_start_from_rest_needs_a_grip_that_moves(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from bodies import box, ends, notched, wavy
-from guarded import NOTCHED, PLAIN, simulation
+from guarded import NOTCHED, PLAIN, Stop, simulation
 
 from skfsink.errors import ConvergenceError, Interrupted, MeshError, ParameterError
 from skfsink.fem.space import Space
@@ -319,13 +319,13 @@ def test_run_under_a_traction(tmp_path: Path) -> None:
     state = sim.run()
     table = History.load(tmp_path / "history.csv")
     loading = table["phase"] == "loading"
-    assert state.deleted.sum() > 10 and sim.recorder.tracker.arrival is not None
+    assert state.deleted.sum() > 10 and sim.crack.tracker.arrival is not None
     np.testing.assert_allclose(table["reaction_N_per_mm"][loading], 0.1 * table["time_s"][loading], rtol=1e-12)
     assert (np.diff(table["grip_displacement_mm"][loading]) > 0).all()
     assert np.abs(table["balance"][~loading]).max() < 1e-9 * table["elastic"][loading][-1]
     assert abs(table["balance"][loading][-1]) < 0.01 * table["elastic"][loading][-1]
     assert (table["loads"] < 0).all() and table.units["loads"] == "N mm/mm"
-    external = sim.recorder.onset["work"]
+    external = sim.onset.figures["work"]
     assert external == pytest.approx(float(-np.trapezoid(table["grip_displacement_mm"][loading],
                                                          table["reaction_N_per_mm"][loading])), rel=0.05)
 
@@ -338,8 +338,8 @@ def test_sweeps_under_traction_and_grips(tmp_path: Path) -> None:
     grips = (Grip("top", (0.0, Ramp((1.0, 2.0), (0.0, 0.4)))), Grip("bottom", (0.0, 0.0)))
     sim = simulation(scene(side_load, grips, analysis="quasistatic"), tmp_path / "mixed")
     state = sim.run()
-    ledger, scale = state.ledger, sim.recorder.onset["elastic_energy"]
-    assert sim.recorder.tracker.arrival is not None and ledger.released > 0.1 * scale
+    ledger, scale = state.ledger, sim.onset.figures["elastic_energy"]
+    assert sim.crack.tracker.arrival is not None and ledger.released > 0.1 * scale
     assert abs(ledger.balance) < 1e-9 * scale
     with pytest.raises(ConvergenceError, match="the history follows equilibria only: a body that tractions tear"):
         simulation(scene(PULL, analysis="quasistatic"), tmp_path / "dead").run()
@@ -353,17 +353,7 @@ def test_resumed_in_the_middle_of_a_ramp(integrator: str, stop: int, tmp_path: P
     of = scene((Traction("top", (Ramp((0.0, 2.0), (0.0, 0.02)), quick)),), integrator=integrator, event_time=1e-5)
     whole = simulation(of, tmp_path / "whole")
     whole.run()
-    broken = simulation(of, tmp_path / "broken")
-    calls = 0
-
-    def pause(phase: str) -> None:
-        nonlocal calls
-        calls += 1
-        if calls == stop:
-            broken.checkpoint()
-            raise Interrupted("stopped")
-
-    broken._pause = pause  # type: ignore[method-assign]
+    broken = simulation(of, tmp_path / "broken", Stop(stop))
     with pytest.raises(Interrupted):
         broken.run()
     resumed = Simulation(of, tmp_path / "broken", Display(True), resume=True)
@@ -385,7 +375,7 @@ def test_load_is_that_of_the_first_grip_that_moves(tmp_path: Path) -> None:
         for state in sim.statics.load(sim.state):
             if state.grip >= 2.0:
                 break
-        gauge = sim.recorder.gauge
+        gauge = sim.view.gauge
         assert of.moving is moving and of.opposite is (still if grips == "ts" else None)
         assert gauge.displacement(state) == pytest.approx(1e-3 * state.grip, rel=1e-9)
         force = sim.momentum.force(state.u)

@@ -34,8 +34,8 @@ from skfsink.methods.explicit import Explicit
 from skfsink.methods.hht import HHT
 from skfsink.methods.hht_trial import Trial
 from skfsink.methods.statics import Statics
-from skfsink.run.gauge import Gauge
 from skfsink.run.material_point import beside_theory, mean_deformation, mean_stress
+from skfsink.run.observers.gauge import Gauge
 from skfsink.scene.controls import Controls
 from skfsink.scene.options import Options
 from skfsink.scene.scene import Scene

@@ -7,7 +7,7 @@ import pytest
 from bodies import grid
 
 from skfsink.fem.space import Space
-from skfsink.run.overlap import overlap
+from skfsink.run.observers.overlap import overlap
 
 WIDTH = 0.02   # of the slit [mm]
 N = 10         # elements along 1 mm

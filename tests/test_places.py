@@ -22,7 +22,7 @@ from skfsink.loads.grips import Grip, Ramp
 from skfsink.meshing.sample import Sample
 from skfsink.report.tables import key_table
 from skfsink.results.loader import load
-from skfsink.run import places
+from skfsink.run.observers import places
 from skfsink.scene.scene import Scene
 from skfsink.sweep.table import read_rows
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import skfem
 from bodies import Fracture, at_onset, box, close, ends, grid, held_body, momentum_of, notched, patchy, wavy
-from guarded import NOTCHED, Watched, scene, simulation
+from guarded import NOTCHED, Stop, Watched, scene, simulation
 from scipy.optimize import brentq
 from test_material_library import TISSUE, Hoops
 
@@ -33,6 +33,7 @@ from skfsink.methods.explicit import Explicit
 from skfsink.methods.hht import HHT
 from skfsink.methods.statics import Statics
 from skfsink.run.display import Display
+from skfsink.run.observers.range import check_pressure, check_scene
 from skfsink.run.simulate import Simulation
 from skfsink.scene.scene import Scene
 
@@ -385,18 +386,6 @@ def two_materials(**controls: object) -> Scene:
         Region("upper", where(space, 1, 0.6), STIFF, STRONGER),))
 
 
-class Stopped(Simulation):
-    """A run that is interrupted after a number of steps, with a checkpoint."""
-
-    left = 150
-
-    def _pause(self, phase: str) -> None:
-        self.left -= 1
-        if self.left == 0:
-            self.checkpoint()
-            raise Interrupted("interrupted")
-
-
 @pytest.mark.parametrize("integrator", ["explicit", "hht"])
 def test_a_resumed_run_ends_with_the_same_bytes(integrator: str, tmp_path: Path) -> None:
     """Fails if a region is not in the fingerprint, or a step depends on what a checkpoint of several parts lacks.
@@ -408,8 +397,7 @@ def test_a_resumed_run_ends_with_the_same_bytes(integrator: str, tmp_path: Path)
         (tmp_path / name).mkdir()
     whole = simulation(of, tmp_path / "whole")
     whole.run()
-    parted = Stopped(of, tmp_path / "parted", Display(True))
-    parted.left = 150 if integrator == "explicit" else 25
+    parted = simulation(of, tmp_path / "parted", Stop(150 if integrator == "explicit" else 25))
     with pytest.raises(Interrupted):
         parted.run()
     Simulation(of, tmp_path / "parted", Display(True), resume=True).run()
@@ -426,12 +414,12 @@ def test_warnings_name_the_region(caplog: pytest.LogCaptureFixture) -> None:
     """Fails if a warning looks at one material only, or does not say which one it means."""
     space = scene().sample.space
     nearly = Region("rubber", np.arange(20), AAA(bulk_modulus=1e5), LAW)
-    Watched(dataclasses.replace(scene(material=SOFT, element="plain"), regions=(nearly,))).guard.check_scene()
+    check_scene(dataclasses.replace(scene(material=SOFT, element="plain"), regions=(nearly,)))
     assert "locks at k/mu = 8.104e+04 (above 50) in region rubber" in caplog.text
     assert "k/mu = 8.1e+04 in region rubber is so large" in caplog.text
     caplog.clear()
     rubber = Region("rubber", np.arange(space.n_elements - 20), SOFT, LAW)
-    Watched(dataclasses.replace(scene(element="plain"), regions=(rubber,))).guard.check_scene()
+    check_scene(dataclasses.replace(scene(element="plain"), regions=(rubber,)))
     assert "(above 50) outside of the regions" in caplog.text
 
 
@@ -443,7 +431,7 @@ def test_a_jump_of_pressure_between_materials_is_no_checkerboard(caplog: pytest.
     watched = Watched(of)
     watched.state.u = space.X * np.array([0.0, 0.01])
     with caplog.at_level(logging.WARNING):
-        watched.guard._check_pressure(watched.state)
+        check_pressure(of, watched.state)
     assert caplog.text == ""
     pressure = np.where(np.isin(np.arange(space.n_elements), upper), 8.0, 0.4)
     assert indicators.alternation(space, pressure) > 0.5
@@ -451,7 +439,7 @@ def test_a_jump_of_pressure_between_materials_is_no_checkerboard(caplog: pytest.
     columns = np.round(space.X[:, 0] * 15).astype(int)
     watched.state.u = space.X * np.array([0.0, 0.0]) + np.stack([0.01 * (columns % 2) / 15, 0 * columns], axis=1)
     with caplog.at_level(logging.WARNING):
-        watched.guard._check_pressure(watched.state)
+        check_pressure(of, watched.state)
     assert "in region upper" in caplog.text
 
 

@@ -27,7 +27,7 @@ from skfsink.meshing.vtu import write_mesh
 from skfsink.run.checkpoint import load_checkpoint
 from skfsink.run.display import Interrupt
 from skfsink.run.memory import LIMIT, available, estimate, factor_entries
-from skfsink.run.recorder import Recorder
+from skfsink.run.observers.observer import Observers
 from skfsink.scene.stored import read_scene
 
 REFERENCES = sorted((Path(__file__).resolve().parents[1] / "cases").glob("*/reference/*/summary.json"))
@@ -181,7 +181,7 @@ def test_programs_that_are_stopped(number: signal.Signals, mesh: Path, tmp_path:
         assert time.monotonic() - begun < 15
         folder = sign.parents[1]
         scene = read_scene(folder)
-        assert load_checkpoint(folder / "checkpoint.npz", scene.fingerprint)[0].phase == "event"
+        assert load_checkpoint(folder / "checkpoint.npz", scene.fingerprint).state.phase == "event"
 
 
 # --- disks ---
@@ -246,20 +246,20 @@ def test_a_disk_that_is_full(small_disk: Path, mesh: Path, tmp_path: Path, monke
 @pytest.mark.parametrize("away", ["series", "."])
 def test_folders_that_vanish(away: str, mesh: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if a folder that is moved away in a run is a traceback, is made again, or what was in it is lost."""
-    out, calls, mark = tmp_path / "out", 0, Recorder.watch
+    out, calls, mark = tmp_path / "out", 0, Observers.step
 
-    def moved(self: Recorder, *arguments: Any) -> bool:
+    def moved(self: Observers, *arguments: Any) -> None:
         nonlocal calls
         calls += 1
         if calls == 20:
             shutil.move(out / away, tmp_path / "elsewhere")
-        return mark(self, *arguments)
+        mark(self, *arguments)
 
-    monkeypatch.setattr(Recorder, "watch", moved)
+    monkeypatch.setattr(Observers, "step", moved)
     monkeypatch.setattr(skfsink.run.run, "draw_run", lambda *_: None)
     status, err = forked(["--mesh", mesh, "--out", out, "--event-time", "2e-5", "--frame-every", "1e-6",
                           "--checkpoint-every", "0.01", *SMALL])
     assert status == 2 and err.startswith("skfsink: cannot write ") and "No such file" in err, err
-    monkeypatch.setattr(Recorder, "watch", mark)
+    monkeypatch.setattr(Observers, "step", mark)
     shutil.move(tmp_path / "elsewhere", out / away)
     assert forked(["--resume", out, "--quiet"]) == (0, "")

@@ -25,9 +25,9 @@ separation   no path of uncracked nodes joins two grips.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -82,6 +82,8 @@ class CrackTracker:
     rim: node numbers of the rim.
     planes: of symmetry.
     """
+
+    _REMEMBERED = ("arrival_length", "max_branches", "separated")
 
     def __init__(self, space: Space, length_scale: float, shear_wave_speed: float | None, grips: list[np.ndarray],
                  rim: np.ndarray, planes: Sequence[Plane] = ()) -> None:
@@ -252,17 +254,24 @@ class CrackTracker:
         held = [set(labels[g].tolist()) - {-1} for g in self._grips]
         return any(not (a & b) for i, a in enumerate(held) for b in held[i + 1:])
 
-    # --- checkpoints ---
-    def memory(self) -> dict[str, Any]:
-        """Everything the tracker remembers, as arrays."""
-        nan = np.nan if self.arrival is None else self.arrival
-        return {"cracked_at": self.cracked_at, "origin": self.origin, "track": np.array(self.track).reshape(-1, 2),
-                "scalars": np.array([nan, self.arrival_length, self.max_branches, self.separated], float)}
+    def nothing(self) -> Tips:
+        """The tips of a body that has not cracked; for a tracker that has marked nothing yet."""
+        tips = self.look(0.0, np.ones(self.space.n_nodes))
+        self.track.clear()
+        return tips
 
-    def restore(self, memory: dict[str, np.ndarray]) -> None:
+    # --- checkpoints ---
+    def memory(self) -> dict[str, np.ndarray]:
+        """Everything the tracker remembers, as arrays."""
+        return {"cracked_at": self.cracked_at, "origin": self.origin, "track": np.array(self.track).reshape(-1, 2),
+                "arrival": np.array(np.nan if self.arrival is None else self.arrival),
+                **{name: np.array(getattr(self, name)) for name in self._REMEMBERED}}
+
+    def restore(self, memory: Mapping[str, np.ndarray]) -> None:
         """Take up what :meth:`memory` gave."""
         self.cracked_at, self.origin = memory["cracked_at"].copy(), memory["origin"].copy()
         self.track = [(float(t), float(x)) for t, x in memory["track"]]
-        arrival, self.arrival_length, branches, separated = map(float, memory["scalars"])
+        arrival = memory["arrival"].item()
         self.arrival = None if np.isnan(arrival) else arrival
-        self.max_branches, self.separated = int(branches), bool(separated)
+        for name in self._REMEMBERED:
+            setattr(self, name, memory[name].item())

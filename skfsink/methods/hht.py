@@ -220,6 +220,10 @@ class HHT:
         ledger.elastic, ledger.loads = momentum.energy, momentum.loads
         self._now = Balance(force, new.inertia, momentum.gamma, momentum.W, mass, places)
 
+    def step_share(self, state: State) -> float:
+        """Infinity: the scheme has no stability limit."""
+        return np.inf
+
     # --- checkpoints ---
     def sync(self, state: State) -> None:
         """Nothing to do: the state is complete after every step."""

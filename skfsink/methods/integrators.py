@@ -36,6 +36,9 @@ class Integrator(Protocol):
     def run(self, state: State, t_end: float) -> Iterator[State]:
         """One accepted step, then `yield state`, until `t_end` [s]."""
 
+    def step_share(self, state: State) -> float:
+        """The step over its stability limit at `state`; infinity where there is no limit. Nothing is changed."""
+
     def sync(self, state: State) -> None:
         """Bring the state up to date, if parts of it are kept elsewhere."""
 

@@ -95,6 +95,23 @@ class Series:
             meshio.write(part, mesh, "vtu", compression="zlib")
         self._write_index()
 
+    def check(self, n: int) -> list[float]:
+        """Times of the first `n` frames of the series found in the folder; nothing is changed.
+
+        Raises
+        ------
+        OutputError
+            There is no such series, or it has fewer frames.
+        """
+        failure = f"cannot resume the series of fields: {self.path}"
+        try:
+            times = [float(entry.attrib["timestep"]) for entry in ET.parse(self.path).iter("DataSet")] if n else []
+        except (OSError, ET.ParseError, KeyError, ValueError):
+            raise OutputError(f"{failure} is missing or damaged") from None
+        if (there := sum(self.frame(i).is_file() for i in range(min(n, len(times))))) < n:
+            raise OutputError(f"{failure} has {there} of the {n} frames")
+        return times[:n]
+
     def resume(self, n: int) -> None:
         """Take up the series found in the folder after its first `n` frames; drop the later ones.
 
@@ -104,14 +121,7 @@ class Series:
             There is no such series, or it has fewer frames.
         """
         self.flush()
-        failure = f"cannot resume the series of fields: {self.path}"
-        try:
-            times = [float(entry.attrib["timestep"]) for entry in ET.parse(self.path).iter("DataSet")] if n else []
-        except (OSError, ET.ParseError, KeyError, ValueError):
-            raise OutputError(f"{failure} is missing or damaged") from None
-        if (there := sum(self.frame(i).is_file() for i in range(min(n, len(times))))) < n:
-            raise OutputError(f"{failure} has {there} of the {n} frames")
-        self.times = times[:n]
+        self.times = self.check(n)
         self._write_index()
         while self.frame(n).is_file():
             self.frame(n).unlink()

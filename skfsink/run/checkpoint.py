@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import io
 import json
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,23 +15,32 @@ from ..errors import CheckpointError
 from ..fields.state import State
 from ..system.files import write_atomic
 
-__all__ = ["load_checkpoint", "load_state", "save_checkpoint", "save_state"]
+__all__ = ["Stored", "load_checkpoint", "load_state", "save_checkpoint", "save_state"]
 
 
-def save_checkpoint(path: Path, fingerprint: str, state: State, memories: dict[str, dict[str, np.ndarray]],
-                    extra: dict[str, Any]) -> None:
-    """Write the state, the memories of the integrator and trackers (arrays by name), and `extra` (JSON)."""
+class Stored(NamedTuple):
+    """What a checkpoint holds: the state, and by its owner what each part of the run remembers."""
+
+    state: State
+    memories: dict[str, dict[str, Any]]
+
+
+def save_checkpoint(path: Path, fingerprint: str, state: State, memories: Mapping[str, Mapping[str, Any]]) -> None:
+    """Write the state, and the memories of integrator, observers and others: arrays, and plain values as JSON has."""
     fields, values = state.stored()
-    arrays = {f"state/{k}": v for k, v in fields.items()}
-    arrays |= {f"{owner}/{k}": v for owner, memory in memories.items() for k, v in memory.items()}
-    meta = {"version": __version__, "fingerprint": fingerprint, "state": values, "extra": extra}
+    arrays = {f"state/{name}": value for name, value in fields.items()}
+    plain: dict[str, dict[str, Any]] = {}
+    for owner, memory in memories.items():
+        plain[owner] = {name: value for name, value in memory.items() if not isinstance(value, np.ndarray)}
+        arrays |= {f"{owner}/{name}": value for name, value in memory.items() if isinstance(value, np.ndarray)}
+    meta = {"version": __version__, "fingerprint": fingerprint, "state": values, "memories": plain}
     arrays["meta"] = np.frombuffer(json.dumps(meta).encode(), np.uint8)
     buffer = io.BytesIO()
     np.savez(buffer, **arrays)  # type: ignore[arg-type]
     write_atomic(path, buffer.getvalue())
 
 
-def load_checkpoint(path: Path, fingerprint: str) -> tuple[State, dict[str, dict[str, np.ndarray]], dict[str, Any]]:
+def load_checkpoint(path: Path, fingerprint: str) -> Stored:
     """What :func:`save_checkpoint` wrote.
 
     Raises
@@ -50,23 +60,23 @@ def load_checkpoint(path: Path, fingerprint: str) -> tuple[State, dict[str, dict
         raise CheckpointError(f"the checkpoint {path} is damaged: {first}") from None
     if version != __version__:
         raise CheckpointError(f"the checkpoint {path} was written by skfsink {version}, this is {__version__}")
-    if found not in (fingerprint, fingerprint.partition("-")[0]):  # the latter is of an earlier version
+    if found != fingerprint:
         raise CheckpointError(f"the checkpoint {path} belongs to another scene than scene.toml beside it")
-    memories: dict[str, dict[str, np.ndarray]] = {}
-    for key, value in arrays.items():
-        owner, name = key.split("/", 1)
-        memories.setdefault(owner, {})[name] = value
     try:
-        return State.restored(memories.pop("state"), meta["state"]), memories, meta["extra"]
+        memories: dict[str, dict[str, Any]] = {**meta["memories"], "state": {}}
+        for key, value in arrays.items():
+            owner, name = key.rsplit("/", 1)
+            memories[owner][name] = value
+        return Stored(State.restored(memories.pop("state"), meta["state"]), memories)
     except (KeyError, TypeError) as error:
         raise CheckpointError(f"the checkpoint {path} is damaged: {error} is missing") from None
 
 
 def save_state(path: Path, fingerprint: str, state: State) -> None:
     """Write a state alone, such as the onset."""
-    save_checkpoint(path, fingerprint, state, {}, {})
+    save_checkpoint(path, fingerprint, state, {})
 
 
 def load_state(path: Path, fingerprint: str) -> State:
     """Read what :func:`save_state` wrote."""
-    return load_checkpoint(path, fingerprint)[0]
+    return load_checkpoint(path, fingerprint).state

@@ -58,7 +58,9 @@ class Display:
             self.say(name)
 
     def update(self, fraction: float, figures: str) -> None:
-        """Show that `fraction` of the phase is done, and `figures` below it."""
+        """Show that `fraction` of the phase is done, and `figures` below it; before the first phase nothing is shown."""
+        if self._task is None:
+            return
         fraction = min(max(fraction, 0.0), 1.0)
         self._progress.update(self._task, completed=fraction)
         self._figures.plain = figures

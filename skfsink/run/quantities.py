@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from ..fields.state import State
 from ..scene.scene import Scene
-from .recorder import Recorder
+from .simulate import Simulation
 
 __all__ = ["PATH", "crack_cells", "measured", "relative_error"]
 
@@ -17,13 +17,14 @@ PATH = "crack_path"
 NEAR = 1.5  # lengths l between cells of two cracks that are the same
 
 
-def measured(scene: Scene, recorder: Recorder) -> dict[str, float | None]:
+def measured(scene: Scene, simulation: Simulation) -> dict[str, float | None]:
     """Figures of a run for the whole sample, whatever part of it was computed; None where its model gives none.
 
     onset_load [N; N/mm of a plate], onset_displacement of the grips [mm], U and D at the first arrival [N mm; N mm/mm],
     arrival_time from the first cracked node to the first arrival [s], tip_speed up to there [m/s].
     """
-    whole, onset, arrival, tracker = scene.whole, recorder.onset, recorder.at_arrival, recorder.tracker
+    whole, onset = scene.whole, simulation.onset.figures
+    arrival, tracker = simulation.crack.at_arrival, simulation.crack.tracker
     dynamic = scene.controls.analysis == "dynamic"
     first = float(tracker.cracked_at.min())
     return {"onset_load": onset["reaction_N_per_mm"] * whole.load if onset else None,

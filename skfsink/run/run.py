@@ -10,10 +10,9 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from ..errors import Interrupted, OutputError, ParameterError
-from ..fields.state import State
 from ..meshing.kept_mesh import MESH, keep_mesh, mesh_name, origin
 from ..meshing.outline import has_gmsh
 from ..pictures.of_a_run import draw_comparison, draw_run
@@ -30,7 +29,7 @@ from .display import Display
 from .memory import check_memory
 from .model import AUTO, choose_model
 from .occupied import occupied
-from .simulate import Simulation
+from .simulate import Loaded, Simulation
 from .summarize import summarize
 from .two_pass import corridor_report, lay_corridor
 
@@ -152,15 +151,15 @@ def _run_both(scene: Scene, folder: Path, display: Display, resume: bool,
     begun = {analysis: resume and (folder / analysis / SCENE).exists() for analysis in scenes}
     for analysis, part in scenes.items():  # refuse before any file is touched
         if begun[analysis]:
-            state, *_ = load_checkpoint(folder / analysis / Simulation.CHECKPOINT, part.fingerprint)
-            if analysis == "dynamic" and state.phase != "loading":
+            stored = load_checkpoint(folder / analysis / Simulation.CHECKPOINT, part.fingerprint)
+            if analysis == "dynamic" and stored.state.phase != "loading":
                 load_state(folder / analysis / Simulation.ONSET, part.fingerprint)
     if not resume:
         for analysis in scenes:
             _begin(folder / analysis, overwrite=True)
         _write_scene(scene, folder)
     parts: dict[str, Result] = {}
-    onset: Onset | None = None
+    onset: Loaded | None = None
     for analysis, part in scenes.items():
         if not begun[analysis]:
             _begin(folder / analysis, overwrite=True)
@@ -178,19 +177,12 @@ def _run_both(scene: Scene, folder: Path, display: Display, resume: bool,
     return Result(folder, scene, summary, first.history, first.state, parts)
 
 
-class Onset(NamedTuple):
-    """A state at the onset, and what :attr:`.Recorder.greatest` was on the way to it."""
-
-    state: State
-    greatest: dict[str, Any]
+def _onset(folder: Path, fingerprint: str) -> Loaded:
+    memories = load_checkpoint(folder / Simulation.CHECKPOINT, fingerprint).memories
+    return Loaded(load_state(folder / Simulation.ONSET, fingerprint), memories["observer Strength"])
 
 
-def _onset(folder: Path, fingerprint: str) -> Onset:
-    *_, extra = load_checkpoint(folder / Simulation.CHECKPOINT, fingerprint)
-    return Onset(load_state(folder / Simulation.ONSET, fingerprint), extra["recorder"].get("greatest", {}))
-
-
-def _run_one(scene: Scene, folder: Path, display: Display, resume: bool, onset: Onset | None = None,
+def _run_one(scene: Scene, folder: Path, display: Display, resume: bool, onset: Loaded | None = None,
              notes: Sequence[str] = ()) -> Result:
     simulation = Simulation(scene, folder, display, resume)
     with simulation.notes:
@@ -204,11 +196,11 @@ def _run_one(scene: Scene, folder: Path, display: Display, resume: bool, onset: 
         display.say(f"note: {text}")
     display.say(f"{scene.title}, mesh {scene.sample.name}: {space.n_elements} elements, {int(simulation.free.sum())} + "
                 f"{space.n_nodes} unknowns; {scene.controls.analysis} analysis in {folder}")
-    state = simulation.run() if onset is None else simulation.run(onset.state.copy(), onset.greatest)
+    state = simulation.run(onset)
     display.phase("output")
     display.update(0.0, "")
-    draw_run(scene, folder, "loading" if simulation.unfailed else "run", simulation.recorder.moments)
-    simulation._lap("output")
+    draw_run(scene, folder, "loading" if simulation.unfailed else "run", simulation.frames.moments)
+    simulation.costs.lap("output")
     two = scene.parameters["mesh_layout"] == "two-pass"
     corridor = {"corridor": corridor_report(simulation, corridor_mesh(folder).parent)} if two else {}  # it may warn
     summary = {**summarize(scene, simulation), **corridor}

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import closing
-from functools import partial
 from pathlib import Path
-from typing import Any
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,20 +14,34 @@ from ..errors import CheckpointError, Interrupted
 from ..fem.direct import one_thread_of_openblas
 from ..fields.body import Body
 from ..fields.state import State
-from ..methods.explicit import Explicit
 from ..methods.integrators import INTEGRATORS, Integrator
 from ..methods.rest import LoadingFromRest
 from ..methods.statics import Statics
-from ..results.history import history_units
 from ..scene.scene import Scene
 from .checkpoint import load_checkpoint, save_checkpoint, save_state
 from .checks import warn
+from .cost import Cost
 from .display import Display, Interrupt
 from .notes import Notes
-from .places import check_arrival, said
-from .recorder import Recorder
+from .observers.crack import Crack, tracker_of
+from .observers.frames import Frames
+from .observers.guard import Guard
+from .observers.history import Deletions, History
+from .observers.observer import Observer, Observers
+from .observers.onset import Onset, Strength
+from .observers.places import check_arrival, said
+from .observers.progress import Checkpoint, Progress
+from .observers.range import check_scene
+from .observers.view import View
 
-__all__ = ["Simulation"]
+__all__ = ["Loaded", "Simulation"]
+
+
+class Loaded(NamedTuple):
+    """A state at the onset, and the memory of :class:`.Strength` on the way to it."""
+
+    state: State
+    strength: Mapping[str, Any] = MappingProxyType({"greatest": {}})
 
 
 class Simulation:
@@ -43,59 +56,57 @@ class Simulation:
     folder: where `history.csv`, the series and the checkpoint go; it must exist.
     display: what the person sees.
     resume: take up the run where the checkpoint in `folder` left it.
+    observers: a user's, beside those of every run or in their place; see :class:`.Observer`.
 
     Raises
     ------
     CheckpointError
-        The checkpoint to resume from is missing, damaged, or of another scene or version.
+        The checkpoint to resume from is missing, damaged, or of another scene, version, or other observers.
     """
 
     PATIENCE = 400.0  # a body that comes from rest in motion may take this many times `event_time` to crack
+    SPENT = 1e-4      # of the energy at the onset: with less, a separated body is at rest
     CHECKPOINT = "checkpoint.npz"
     ONSET = "onset.npz"
 
-    def __init__(self, scene: Scene, folder: Path, display: Display, resume: bool = False) -> None:
+    def __init__(self, scene: Scene, folder: Path, display: Display, resume: bool = False,
+                 observers: Sequence[Observer] = ()) -> None:
         # a checkpoint that cannot be used is refused before any file is touched
         stored = load_checkpoint(folder / self.CHECKPOINT, scene.fingerprint) if resume else None
-        if stored and "recorder" not in stored[2]:
+        if stored and "run" not in stored.memories:
             path = folder / self.CHECKPOINT
             raise CheckpointError(f"the checkpoint {path} is damaged: it is a state without its run")
+        memory = stored.memories.pop("run") if stored else {}
         self.scene, self.folder, self.display = scene, folder, display
         self.body = Body.of(scene)
-        self.momentum, self.density, self.loading = self.body.momentum, self.body.density, self.body.loading
-        self.free = self.body.free
+        self.momentum, self.density, self.free = self.body.momentum, self.body.density, self.body.free
         self.statics = Statics(self.body, scene.controls.statics)
-        self.recorder = Recorder(scene, folder, self.momentum, self.density, self.loading,
-                                 stored[2]["recorder"] if stored else None)
-        self.notes = Notes(display.say, stored[2].get("warnings", []) if stored else [])
-        self.state = State.intact(self.body.space)
+        self.notes = Notes(display.say, memory.get("warnings", ()))
+        self.state = stored.state if stored else State.intact(self.body.space)
+        self.costs = Cost(memory.get("cost"))
         self.integrator: Integrator | None = None
         self._from_rest: LoadingFromRest | None = None
-        self.wall = {"loading": 0.0, "event": 0.0, "output": 0.0}
-        self.counts = {"steps": 0, "gamma_solves": 0, "factorisations": 0}
-        self._saved = self._clock = time.perf_counter()
+        tracker = tracker_of(scene, self.body)
+        self.view = View(scene, folder, self.body, tracker, tracker.nothing(), self.state, save=self._save)
+        self.observers = Observers(_standard(scene, display), observers)
+        of = self.observers.of
+        self.crack, self.guard, self.frames = of(Crack), of(Guard), of(Frames)
+        self.onset, self.strength, self.history = of(Onset), of(Strength), of(History)
+        memories = stored.memories if stored else {}
+        self.observers.open(self.view, {name.removeprefix("observer "): kept for name, kept in memories.items()
+                                        if name.startswith("observer ")} if stored else None)
         if stored:
-            self._restore(*stored)
+            self._restore(memories)
 
     # --- the phases ---
-    def run(self, onset: State | None = None, greatest: Mapping[str, Any] | None = None) -> State:
-        """Run to the end from where the state is.
-
-        `onset` is a state already loaded to the onset, `greatest` what :attr:`.Recorder.greatest` was on the way.
-        """
-        with Interrupt() as interrupt, self.notes, one_thread_of_openblas(), closing(self.recorder.series), \
-                closing(self.recorder.loading_series):
-            self._interrupt = interrupt
+    def run(self, onset: Loaded | None = None) -> State:
+        """Run to the end from where the state is, or from a state that another run has loaded to the onset."""
+        with Interrupt() as interrupt, self.notes, one_thread_of_openblas(), closing(self.observers):
+            self.view.stop_asked = interrupt.heeded
             if self.state.phase == "loading":
-                self.recorder.guard.check_scene()
-                warn(self.scene, self.folder)
-                if onset is None:
-                    self._load()
-                else:
-                    self.recorder.greatest = dict(greatest or {})
-                    self._adopt(onset)
+                self._load(onset)
                 if self.unfailed:
-                    self.recorder.unfailed(self.state)
+                    self.observers.unfailed(self.view)
                     self.state.phase = "done"
                 else:
                     self._begin_event()
@@ -107,8 +118,8 @@ class Simulation:
                     self._integrate()
                 self.state.phase = "done"
                 if not self.dissolved:
-                    check_arrival(self.scene, self.recorder.tracker)
-            self._lap("event")
+                    check_arrival(self.scene, self.crack.tracker)
+            self.costs.lap("event")
             self.checkpoint()
             if interrupt.heeded():
                 raise Interrupted("interrupted")
@@ -122,37 +133,36 @@ class Simulation:
     @property
     def dissolved(self) -> bool:
         """Whether a body that was loaded evenly has failed everywhere at once."""
-        return self.recorder.guard.dissolved
+        return self.guard.dissolved
 
-    def _load(self) -> None:
+    def _load(self, onset: Loaded | None) -> None:
+        """Load to the onset, or take up the state of another run there."""
+        check_scene(self.scene)
+        warn(self.scene, self.folder)
+        if onset is None:
+            self._increase()
+            if self.unfailed:
+                return
+        else:
+            self.state = onset.state.copy()
+            self.strength.open(self.view, onset.strength)
+            self.observers.loading(self.view.at(self.state, self.body.take(self.state)))
+        self.observers.onset(self.view.at(self.state, self.momentum.force(self.state.u)))
+        if onset is None:
+            save_state(self.folder / self.ONSET, self.scene.fingerprint, self.state)
+
+    def _increase(self) -> None:
+        """Increase the load up to the onset."""
         self.display.phase("loading")
-        state = self.state
-        tolerance = self.scene.controls.statics.onset_tolerance
-        started = False
+        state, view = self.state, self.view
         if self.scene.controls.start == "rest" and self._from_rest is None:
             self._make_integrator()
         loading: LoadingFromRest | Statics = self._from_rest or self.statics
         for _ in loading.load(state):
-            reaction = self.momentum.force(state.u)
-            self.recorder.loading(state, reaction, self.statics.way(state.grip))
-            started = True
-            done = 0.5 * min(1.0, tolerance * state.grip / (loading.increment or np.inf)) ** 0.25
-            self.display.update(done, f"grips {self.recorder.gauge.displacement(state):.4f} mm  load "
-                                      f"{self.recorder.load(reaction):.4f} {self._unit}  "
-                                      f"least γ {state.gamma.min():.3f}")
-            self._pause("loading")
-        self._lap("loading")
-        if self.unfailed:
-            return
-        if started or not self.recorder.onset:
-            self.recorder.reached_onset(state, self.momentum.force(state.u))
-        save_state(self.folder / self.ONSET, self.scene.fingerprint, state)
-
-    def _adopt(self, onset: State) -> None:
-        self.state = onset
-        reaction = self.body.take(onset)
-        self.recorder.loading(onset, reaction)
-        self.recorder.reached_onset(onset, reaction)
+            view.increment = loading.increment
+            self.observers.loading(view.at(state, self.momentum.force(state.u), way=self.statics.way(state.grip)))
+            self.observers.pause(view)
+        self.costs.lap("loading")
 
     def _begin_event(self) -> None:
         """Start a new ledger at the onset, from rest just past it unless the body has come there in motion."""
@@ -165,123 +175,85 @@ class Simulation:
         else:
             self.statics.newton.release()
             if self.integrator is not None:
-                self.counts["factorisations"] += self.integrator.factorisations
-            self._make_integrator()
-            assert self.integrator is not None
-            self.integrator.begin(state)
-        self.recorder.start(state, reaction)
-        self.display.say(said(self.recorder.onset))
+                self.costs.factorisations += self.integrator.factorisations
+            self._make_integrator().begin(state)
+        self.observers.begin(self.view.at(state, reaction, "begin"))
+        self.display.say(said(self.onset.figures))
 
-    def _make_integrator(self) -> None:
+    def _make_integrator(self) -> Integrator:
         c = self.scene.controls
         if self.state.phase == "loading":
             self._from_rest = LoadingFromRest(self.body, c.hht)
             self.integrator = self._from_rest.integrator
         else:
-            self.integrator = INTEGRATORS[c.integrator](self.body, getattr(c, c.integrator))
-            if isinstance(self.integrator, Explicit):
-                self.recorder.guard.step_share = partial(self.integrator.step_share, self.state)
+            self.integrator = self.view.integrator = INTEGRATORS[c.integrator](self.body, getattr(c, c.integrator))
+        return self.integrator
 
     def _integrate(self) -> None:
-        state, integrator, recorder = self.state, self.integrator, self.recorder
+        state, integrator, view, tracker = self.state, self.integrator, self.view, self.crack.tracker
         assert integrator is not None
-        end, cracked = self.scene.controls.event_time, 0.0
+        event_time, cracked = self.scene.controls.event_time, 0.0
+        view.end = event_time
         if self.scene.controls.start == "rest":  # the instability has yet to grow: the clock is that of the crack
-            end, cracked = self.PATIENCE * end, float(recorder.tracker.cracked_at.min())
-        before = state.time
-        for _ in integrator.run(state, end):
-            self.counts["steps"] += 1
-            if recorder.watch(state, integrator.reaction, before, integrator.dt):
-                self._show(state, state.time / end, f"{state.time * 1e6:.1f} µs")
-            before = state.time
-            if recorder.tracker.separated and state.time >= recorder.separated_at + self.scene.controls.aftermath:
+            view.end, cracked = self.PATIENCE * event_time, float(tracker.cracked_at.min())
+        for _ in integrator.run(state, view.end):
+            self.costs.steps += 1
+            self.observers.step(view.at(state, integrator.reaction, "step", dt=integrator.dt))
+            if tracker.separated and state.time >= self.crack.separated_at + self.scene.controls.aftermath:
                 break
-            if self.dissolved:
+            if cracked == np.inf and view.tips.branches:
+                cracked = float(tracker.cracked_at.min())
+            if self.dissolved or state.time >= cracked + event_time:
                 break
-            if cracked == np.inf and recorder.tips.branches:
-                cracked = float(recorder.tracker.cracked_at.min())
-            if state.time >= cracked + self.scene.controls.event_time:
-                break
-            self._pause("event")
+            self.observers.pause(view)
         integrator.sync(state)
-        recorder.finish(state, integrator.reaction, integrator.dt)
+        self.observers.finish(view.at(state, integrator.reaction, "end", dt=integrator.dt))
 
     def _propagate(self) -> None:
-        state, recorder = self.state, self.recorder
-        before = state.time
-        scale = recorder.onset["elastic_energy"]
+        state, view = self.state, self.view
+        spent = self.SPENT * self.onset.figures["elastic_energy"]
         for _ in self.statics.propagate(state):
-            self.counts["steps"] += 1
-            if recorder.watch(state, self.momentum.force(state.u), before, 0.0):
-                self._show(state, 0.0, f"pass {state.step}")
-            before = state.time
-            at_rest = self.statics.settled or state.ledger.elastic < 1e-4 * scale
-            if self.dissolved or (recorder.tracker.separated and at_rest):
+            self.costs.steps += 1
+            self.observers.step(view.at(state, self.momentum.force(state.u), "step"))
+            at_rest = self.statics.settled or state.ledger.elastic < spent
+            if self.dissolved or (self.crack.tracker.separated and at_rest):
                 break
-            self._pause("event")
-        recorder.finish(state, self.momentum.force(state.u), 0.0)
+            self.observers.pause(view)
+        self.observers.finish(view.at(state, self.momentum.force(state.u), "end"))
 
-    def _show(self, state: State, fraction: float, clock: str) -> None:
-        tips, ledger = self.recorder.tips, state.ledger
-        size = float((self.scene.sample.space.X.max(axis=0) - self.scene.sample.space.X.min(axis=0)).max())
-        load = self.recorder.history.rows[-1]["reaction_N_per_mm"]
-        self.display.update(max(fraction, 0.9 * tips.length / size), (
-            f"{clock}  tip {tips.position[0]:.2f}, {tips.position[1]:.2f} mm ×{tips.branches}  "
-            f"load {load:.3f} {self._unit}  elastic {ledger.elastic:.4f} kinetic {ledger.kinetic:.4f} "
-            f"D {ledger.sink:.4f} U {ledger.paper:.4f}"))
-
-    @property
-    def _unit(self) -> str:
-        """Of the load."""
-        return history_units(self.scene.sample.space.dim)["reaction_N_per_mm"]
-
-    # --- clocks and checkpoints ---
-    def _lap(self, phase: str) -> None:
-        now = time.perf_counter()
-        self.wall[phase] += now - self._clock
-        self._clock = now
-
-    def _pause(self, phase: str) -> None:
-        """Between steps: save a checkpoint when one is due, and stop when asked to."""
-        stop = self._interrupt.heeded()
-        if stop or time.perf_counter() - self._saved > self.scene.controls.checkpoint_every:
-            self._lap(phase)
-            self.checkpoint()
-            self._saved = time.perf_counter()
-            if stop or self._interrupt.heeded():
-                raise Interrupted("interrupted")
-
-    def _solver_counts(self) -> dict[str, int]:
-        factorisations = self.statics.factorisations + self.density.factorisations
-        if self.integrator is not None:
-            factorisations += self.integrator.factorisations
-        return {"gamma_solves": self.density.solves, "factorisations": factorisations}
-
+    # --- costs and checkpoints ---
     def cost(self) -> dict[str, Any]:
         """Wall times and counts since the run began, over all its sessions."""
-        live = self._solver_counts()
-        return {"wall": dict(self.wall), "steps": self.counts["steps"],
-                **{k: self.counts[k] + n for k, n in live.items()}}
+        own = 0 if self.integrator is None else self.integrator.factorisations
+        factorisations = self.costs.factorisations + self.statics.factorisations + self.density.factorisations + own
+        return {"wall": dict(self.costs.wall), "steps": self.costs.steps,
+                "gamma_solves": self.costs.gamma_solves + self.density.solves, "factorisations": factorisations}
+
+    def _save(self) -> None:
+        self.costs.lap(self.state.phase)
+        self.checkpoint()
 
     def checkpoint(self) -> None:
         """Write the checkpoint."""
-        memories = {"tracker": self.recorder.tracker.memory(), "statics": self.statics.memory()}
+        memories: dict[str, dict[str, Any]] = {"statics": self.statics.memory()}
         if self.integrator is not None:
             self.integrator.sync(self.state)
             memories["integrator"] = self.integrator.memory()
-        save_checkpoint(self.folder / self.CHECKPOINT, self.scene.fingerprint, self.state, memories,
-                        {"recorder": self.recorder.memory(), "cost": self.cost(), "warnings": self.notes.kept})
+        memories |= {f"observer {name}": memory for name, memory in self.observers.memories().items()}
+        memories["run"] = {"cost": self.cost(), "warnings": self.notes.kept}
+        save_checkpoint(self.folder / self.CHECKPOINT, self.scene.fingerprint, self.state, memories)
 
-    def _restore(self, state: State, memories: dict[str, Any], extra: dict[str, Any]) -> None:
-        self.state = state
-        self.recorder.tracker.restore(memories["tracker"])
+    def _restore(self, memories: dict[str, dict[str, Any]]) -> None:
         self.statics.restore(memories["statics"])
-        cost = extra["cost"]
-        self.wall.update(cost.pop("wall"))
-        self.counts.update(cost)
         if "integrator" in memories:
-            self._make_integrator()
-            assert self.integrator is not None
-            self.integrator.restore(state, memories["integrator"])
+            self._make_integrator().restore(self.state, memories["integrator"])
         else:
-            self.body.take(state)
+            self.body.take(self.state)
+
+
+def _standard(scene: Scene, display: Display) -> list[Observer]:
+    """The observers of every run, in the order in which they look."""
+    c = scene.controls
+    every = c.record_every
+    return [Crack(every), History(every), Strength(), Onset(), Frames(c.frame_every), Guard(every), Deletions(),
+            Progress(display, every), Checkpoint(c.checkpoint_every)]

@@ -12,7 +12,7 @@ from ..results.history import history_units, load_name
 from ..results.summary import versions
 from ..scene.scene import Scene
 from .material_point import beside_theory
-from .places import greatest_ratio
+from .observers.places import greatest_ratio
 from .quantities import measured
 from .simulate import Simulation
 from .verdict import verdict
@@ -30,12 +30,12 @@ def peak_rss_mb() -> float:
 
 def summarize(scene: Scene, simulation: Simulation) -> dict[str, Any]:
     """Summary of a finished run; figures of the onset and of the event are null in one that did not fail."""
-    state, recorder = simulation.state, simulation.recorder
-    ledger, onset, tracker = state.ledger, recorder.onset, recorder.tracker
+    state, crack, greatest = simulation.state, simulation.crack, simulation.strength.greatest
+    ledger, onset, tracker = state.ledger, simulation.onset.figures, crack.tracker
     space, cost = scene.sample.space, simulation.cost()
     dynamic = scene.controls.analysis == "dynamic"
     units = history_units(space.dim)
-    balances = [abs(row["balance"]) for row in recorder.history.rows if row["phase"] != "loading"]
+    balances = [abs(row["balance"]) for row in simulation.history.rows if row["phase"] != "loading"]
     ratio, place = greatest_ratio(simulation.density, state)
     if "ratio" in onset:  # while it was loaded; beyond, W of dead points grows without meaning
         ratio, place = onset["ratio"], onset["place_of_ratio"]
@@ -45,8 +45,8 @@ def summarize(scene: Scene, simulation: Simulation) -> dict[str, Any]:
         "elements": space.n_elements, "dofs": int(simulation.free.sum()) + space.n_nodes,
         "unknowns": {"displacement": int(simulation.free.sum()), "density": space.n_nodes},
         "units": {"load": units["reaction_N_per_mm"], "energy": units["elastic"]},
-        "loading": {"greatest_load": recorder.greatest.get("load"),
-                    "displacement_at_greatest_load_mm": recorder.greatest.get("displacement_mm"),
+        "loading": {"greatest_load": greatest.get("load"),
+                    "displacement_at_greatest_load_mm": greatest.get("displacement_mm"),
                     "greatest_W_over_phi": ratio, "place_of_greatest_W_over_phi_mm": place},
         "material_point": _material_point(scene, simulation),
         "onset": {"displacement_mm": onset.get("displacement_mm"),
@@ -57,27 +57,27 @@ def summarize(scene: Scene, simulation: Simulation) -> dict[str, Any]:
                   "mean_tip_speed_m_per_s": tracker.mean_speed() if dynamic else None,
                   "max_branches": tracker.max_branches, "separated": tracker.separated,
                   "duration_s": state.time if dynamic and onset else None},
-        "energy": {"U_paper_at_arrival": recorder.at_arrival.get("U_paper"), "U_paper_final": ledger.paper,
-                   "D_sink_at_arrival": recorder.at_arrival.get("D_sink"), "D_sink_final": ledger.sink,
+        "energy": {"U_paper_at_arrival": crack.at_arrival.get("U_paper"), "U_paper_final": ledger.paper,
+                   "D_sink_at_arrival": crack.at_arrival.get("D_sink"), "D_sink_final": ledger.sink,
                    "D_sink_stored": ledger.sink_stored, "D_sink_kinetic": ledger.sink_kinetic,
                    "initial": ledger.initial, "elastic_final": ledger.elastic, "kinetic_final": ledger.kinetic,
                    "external_work": onset.get("work", 0.0) + ledger.work, "deletion": ledger.deletion,
                    "numerical": ledger.numerical, "released": ledger.released,
                    "balance_error_relative": max(balances, default=0.0) / onset["elastic_energy"] if onset else None},
-        "quantities": measured(scene, recorder), "model": dict(scene.choice) or None,
+        "quantities": measured(scene, simulation), "model": dict(scene.choice) or None,
         "whole": {"energy": scene.whole.energy, "load": scene.whole.load, "displacement": scene.whole.displacement},
         "deleted_elements": int(state.deleted.sum()), "warnings": simulation.notes.texts,
         "notes": list(scene.sample.notes),
         "cost": {"wall_s": {k: round(v, 3) for k, v in cost["wall"].items()}, "steps": cost["steps"],
                  "gamma_solves": cost["gamma_solves"], "factorisations": cost["factorisations"],
                  "peak_rss_mb": round(peak_rss_mb(), 1)},
-        "versions": versions(), "assumed": list(scene.assumed), "moments": recorder.moments,
+        "versions": versions(), "assumed": list(scene.assumed), "moments": simulation.frames.moments,
         "series": "loading" if simulation.unfailed else "run"}
 
 
 def _material_point(scene: Scene, simulation: Simulation) -> dict[str, Any] | None:
     """Strength beside theory of a body that was loaded evenly."""
-    greatest = simulation.recorder.greatest
-    if not simulation.recorder.guard.even or "F" not in greatest or scene.tractions:
+    greatest = simulation.strength.greatest
+    if not simulation.guard.even or "F" not in greatest or scene.tractions:
         return None
     return beside_theory(scene, np.array(greatest["F"]), np.array(greatest["P"]))

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..errors import place_text
 from ..scene.scene import Scene
-from .places import greatest_ratio
+from .observers.places import greatest_ratio
 from .simulate import Simulation
 
 __all__ = ["verdict"]
@@ -16,7 +16,7 @@ SOFTENED = 0.99  # least gamma of a body that has kept its strength
 
 def verdict(scene: Scene, simulation: Simulation) -> str:
     """One line on what happened in a finished run."""
-    state, tracker, event = simulation.state, simulation.recorder.tracker, scene.controls.event_time
+    state, tracker, event = simulation.state, simulation.crack.tracker, scene.controls.event_time
     if simulation.unfailed:
         ratio, place = greatest_ratio(simulation.density, state)
         least = float(state.gamma.min())
@@ -26,7 +26,7 @@ def verdict(scene: Scene, simulation: Simulation) -> str:
     if simulation.dissolved:
         return f"failed everywhere at once, {_when(scene, state.time)}: no place of it was weaker than another"
     cracked = np.isfinite(tracker.cracked_at)
-    even = simulation.recorder.guard.even
+    even = simulation.guard.even
     quasistatic = scene.controls.analysis == "quasistatic"
     if not cracked.any():
         why = ("the body is loaded evenly, and no place of it is weaker than another; its result is the greatest load"
@@ -35,8 +35,8 @@ def verdict(scene: Scene, simulation: Simulation) -> str:
         return f"nothing cracked {when}, least gamma {state.gamma.min():.3g}: {why}"
     if tracker.separated:
         first = "" if tracker.arrival is None else f", arrived first {_when(scene, tracker.arrival)}"
-        return f"cracked and separated{first}; apart {_when(scene, simulation.recorder.separated_at)}"
-    last = simulation.recorder.history.rows[-1]
+        return f"cracked and separated{first}; apart {_when(scene, simulation.crack.separated_at)}"
+    last = simulation.history.rows[-1]
     tip = f"{place_text(last[f'tip_{x}_mm'] for x in 'xyz'[:scene.sample.space.dim])} mm"
     if quasistatic and simulation.statics.arrested:
         return f"arrested at {tip}: {simulation.statics.arrested}"

@@ -108,14 +108,14 @@ def measure(case: str, name: str, mesh: str = "", base: Options = Options()) -> 
         state = simulation.run()
         price = time.process_time() - cpu
         event = {"corridor": corridor_report(simulation, folder)} if options.mesh_layout == "two-pass" else {}
-    recorder, cost = simulation.recorder, simulation.cost()
+    tracker, cost = simulation.crack.tracker, simulation.cost()
     wall = {"mesh": made, "loading": cost["wall"]["loading"], "event": cost["wall"]["event"]}
     space, steps = scene.sample.space, cost["steps"]
     return {"mesh": mesh, "made": bool(scene.sample.made), "elements": space.n_elements,
-            "quantities": measured(scene, recorder), "crack": crack_cells(scene, state, recorder.tracker.arrival),
+            "quantities": measured(scene, simulation), "crack": crack_cells(scene, state, tracker.arrival),
             "price_s": price, "wall": wall, "steps": steps, "factorisations": cost["factorisations"],
             "mean_step_s": state.time / steps if options.analysis == "dynamic" and steps else None,
-            "branches": recorder.tracker.max_branches, "warnings": simulation.notes.texts, **event}
+            "branches": tracker.max_branches, "warnings": simulation.notes.texts, **event}
 
 
 def _warm(case: str) -> None:

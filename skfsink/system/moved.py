@@ -21,7 +21,7 @@ OLD = {
     **{name: f"methods.{name}" for name in ("newton", "onset", "statics", "explicit", "hht", "inertia")},
     **{name: f"results.{name}" for name in ("loader", "result", "history", "reference")},
     **{name: f"material.{name}" for name in ("homogeneous", "regions")},
-    "film": "pictures.film", "guards": "run.guard", "simulate": "run.simulate", "loading": "loads.schedule",
+    "film": "pictures.film", "guards": "run.observers.guard", "simulate": "run.simulate", "loading": "loads.schedule",
 }
 
 

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..fields.state import State
-from ..loads.grips import Ramp
-from ..loads.schedule import Loading
-from ..scene.scene import Scene
+from ...fields.state import State
+from ...loads.grips import Ramp
+from ...loads.schedule import Loading
+from ...scene.scene import Scene
 
 __all__ = ["Gauge"]
 

@@ -13,13 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import place_text
-from ..fem import indicators
-from ..fields.crack import CrackTracker, Plane
-from ..fields.density import DensitySolver
-from ..fields.state import State
-from ..loads.grips import Grip, Ramp
-from ..scene.scene import Scene
+from ...errors import place_text
+from ...fem import indicators
+from ...fields.crack import CrackTracker, Plane
+from ...fields.density import DensitySolver
+from ...fields.state import State
+from ...loads.grips import Grip, Ramp
+from ...scene.scene import Scene
 
 __all__ = ["beginning", "check_arrival", "check_beginning", "greatest_ratio", "rim_of", "said", "symmetry_planes"]
 

@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..fem.space import Space
-from ..pictures.body import FACETS, outer_facets
-from ..system.jit import njit
+from ...fem.space import Space
+from ...pictures.body import FACETS, outer_facets
+from ...system.jit import njit
 
 __all__ = ["Overlap", "overlap"]
 

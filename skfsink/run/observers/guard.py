@@ -8,41 +8,44 @@ are based on is in `docs/stability.md`.
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
-from ..errors import InstabilityError, SkfsinkError, place_text
-from ..fem import indicators
-from ..fields.momentum import Momentum
-from ..fields.state import State
-from ..material.regions import Region, by_element
-from ..scene.scene import Scene
+from ...errors import InstabilityError, SkfsinkError, place_text
+from ...fem import indicators
+from ...fields.state import State
+from ...material.regions import by_element
+from .observer import Observer
 from .overlap import overlap
+from .range import COARSE, check_onset
+from .view import View
 
 __all__ = ["Guard"]
 
 log = logging.getLogger(__name__)
 
 
-class Guard:
-    """Watches one run of a scene.
+class Guard(Observer):
+    """Watches one run of a scene, against the tolerance `balance_tolerance` of its ledger.
 
-    Memory: evenness and energy at the onset, and failed elements at the last step, and how deep faces overlapped;
-    `check_step`, `check_record`, `check_overlap`, `check_end` and `even` judge by them.
+    Memory: evenness and energy at the onset, failed elements at the last step, and how deep faces overlapped: what it
+    says depends on them.
 
     Parameters
     ----------
-    scene: what is computed, with the tolerance `balance_tolerance` of its ledger.
-    momentum: of the run; its last force evaluation and its density are looked at.
+    every: time between two looks at the whole state [s]; a few comparisons are made in each step.
+
+    Attributes
+    ----------
+    scale: elastic energy at the onset, to which the others are compared.
+    evenness: share of the body that was loaded about as much as its weakest point at the onset.
+    dissolved: whether a body that was loaded evenly has failed everywhere at once.
+    overlaps: depth [mm] of an overlap of faces when it was first seen, and the greatest; empty before.
     """
 
-    LOCKS = 50.0           # k/mu past which the plain element is warned of
-    STIFF = 2e4            # k/mu past which rounding comes near the equilibria
-    COARSE = 1.2           # l/h below which the mesh decides where and when it cracks
-    NARROW = 0.1           # width of an element, of the median one, below which it governs the explicit step
-    SHARP = 60.0           # degrees by which a notch may turn at one node
-    CHECKERED = 0.1        # amplitude of an alternating pressure, of mu
+    kept = ("scale", "evenness", "dissolved", "overlaps")
     FLAT = 0.2             # J below which a live point is close to being turned inside out
     LIVE = 0.5             # gamma of a point that must not be inside out
     NEGATIVE = -1e-6       # gamma below which a nodal density is no rounding
@@ -52,16 +55,56 @@ class Guard:
     DEEPER = 1.5           # times the depth at which an overlap was first seen, that is told at the end
     CARRIED = 0.01         # energy in deleted elements, of the onset energy, that is warned of
 
-    def __init__(self, scene: Scene, momentum: Momentum) -> None:
-        self.scene, self.momentum = scene, momentum
-        self.space = scene.sample.space
-        self.scale = 0.0     #: energy at the onset, to which the others are compared
-        self.evenness = 0.0  #: share of the body that was loaded about as much as its weakest point at the onset
-        self.dissolved = False  #: whether a body that was loaded evenly has failed everywhere at once
-        self.step_share: Callable[[], float] = lambda: np.inf  #: explicit step over its stability limit, now
+    def __init__(self, every: float) -> None:
+        self.every = every
+        self.scale = self.evenness = 0.0
+        self.dissolved = False
+        self.overlaps: list[float] = []
         self._deleted = -1   # elements at the last step
         self._inside_out = False
-        self.overlaps: list[float] = []  #: depth [mm] of an overlap of faces when it was first seen, and the greatest
+
+    def open(self, view: View, memory: Mapping[str, Any] | None = None) -> None:
+        """Take up what was seen so far."""
+        super().open(view, memory)
+        self.scene, self.space, self.momentum, self._view = view.scene, view.body.space, view.body.momentum, view
+
+    # --- when it looks ---
+    def loading(self, view: View) -> None:
+        """Look for faces that overlap in each load increment, and at a stress that was asked for."""
+        self.check_overlap(view.state)
+        self._check_stress(view)
+
+    def onset(self, view: View) -> None:
+        """Look at the state at the onset."""
+        self.check_onset(view.state)
+
+    def unfailed(self, view: View) -> None:
+        """Look at the last state of a body that did not fail."""
+        self._check_stress(view)
+        self.check_end()
+
+    def due(self, view: View) -> bool:
+        """In each step."""
+        return True
+
+    def look(self, view: View) -> None:
+        """Look at what each step leaves behind, at a record at the whole state, at a frame for faces that overlap."""
+        step = view.occasion == "step"
+        if step:
+            self.check_step(view.state)
+        if not step or view.moment or super().due(view):
+            self.check_record(view.state)
+        if view.stress_is_known:  # a frame has asked for it
+            self.check_overlap(view.state)
+            self._check_stress(view)
+
+    def finish(self, view: View) -> None:
+        """Sum up."""
+        self.check_end()
+
+    def _check_stress(self, view: View) -> None:
+        if view.stress_is_known:
+            self.check_stress(view.state, np.isnan(view.stress).any(axis=1))
 
     @property
     def _step_cure(self) -> str:
@@ -78,45 +121,9 @@ class Guard:
     def _share_of_limit(self) -> float:
         """The explicit step over its stability limit; infinite where that cannot be told any more."""
         try:
-            return self.step_share()
+            return self._view.step_share
         except SkfsinkError:
             return np.inf
-
-    # --- before the run ---
-    def check_scene(self) -> None:
-        """Warn of a material, an element or a mesh beyond the range of the methods."""
-        space, l = self.space, self.scene.sink_law.length_scale
-        # the part that is least compressible for its shear modulus is the first to lock, and the first to lose digits
-        part = max(self.scene.parts, key=lambda part: part.material.bulk_modulus / part.material.shear_modulus)
-        ratio = part.material.bulk_modulus / part.material.shear_modulus
-        if self.scene.controls.element == "plain" and ratio > self.LOCKS:
-            log.warning("the plain element locks at k/mu = %.4g (above %g)%s: stiffness, onset load and U come out too "
-                        "high; take --element jbar", ratio, self.LOCKS, self._where(part))
-        if ratio > self.STIFF and self.scene.controls.element != "planestress":
-            log.warning("k/mu = %.3g%s is so large (above %g) that rounding comes near the tolerance of equilibria, "
-                        "and the explicit step falls with its root; with --bulk-modulus %.3g the solid is as good as "
-                        "incompressible", ratio, self._where(part), self.STIFF, 1e3 * part.material.shear_modulus)
-        h = float(space.h.min())
-        if h > l / self.COARSE:
-            log.warning("no element is finer than h = %.3g mm, l/h = %.2f (less than %g): onset and U are those of the "
-                        "mesh; refine it to h <= l/3, or raise --length-scale", h, l / h, self.COARSE)
-        angle, place = indicators.turning(space)
-        if angle > self.SHARP:
-            log.warning("a notch turns by %.0f degrees at one node, at %s mm (above %g): it is as sharp as elements "
-                        "are small, which moves onset and U; round it with at least 4 elements", angle,
-                        place_text(place), self.SHARP)
-        c = self.scene.controls
-        if c.analysis != "quasistatic" and c.integrator == "explicit":
-            self._check_widths()
-
-    def _check_widths(self) -> None:
-        """Elements that cut the explicit step for all others."""
-        widths = indicators.widths(self.space)
-        typical, e = float(np.median(widths)), int(np.argmin(widths))
-        if widths[e] < self.NARROW * typical:
-            log.warning("an element near %s mm is %.2g mm narrow, most are %.2g mm (a share less than %g): it makes "
-                        "the explicit step that much shorter for all; mend the mesh there, or take --integrator hht",
-                        place_text(self.space.X[self.space.conn[e]].mean(axis=0)), widths[e], typical, self.NARROW)
 
     def check_onset(self, state: State) -> None:
         """Look at the state at the onset: where it will crack, and whether it is an equilibrium worth starting from.
@@ -126,15 +133,8 @@ class Guard:
         InstabilityError
             The ledger of the loading does not close, or a live point is inside out.
         """
-        space, l = self.space, self.scene.sink_law.length_scale
-        self.evenness = self._even_share(state)
-        weakest = int(np.argmin(state.gamma))
-        h = indicators.size_near(space, weakest, l)
-        if h > l / self.COARSE:
-            log.warning("where it begins to fail, at %s mm, elements have h = %.3g mm, l/h = %.2f (less than %g): "
-                        "onset and U are those of the mesh; refine it there to h <= l/3, or raise --length-scale",
-                        place_text(space.X[weakest]), h, l / h, self.COARSE)
-        self._check_pressure(state)
+        self.scale, self.evenness = state.ledger.elastic, self._even_share(state)
+        check_onset(self.scene, state)
         error, allowed = state.ledger.error(state.ledger.elastic), self.scene.controls.balance_tolerance
         if not error <= allowed:
             raise InstabilityError(f"the ledger of the loading is open by {error:.2%} of the stored energy, allowed "
@@ -159,25 +159,6 @@ class Guard:
         """Whether this body may fail everywhere at once, since it is loaded evenly; it has, then."""
         self.dissolved = self.dissolved or self.even
         return self.dissolved
-
-    def _check_pressure(self, state: State) -> None:
-        """Pressures that alternate, in each material for itself: they jump from one to another."""
-        if self.scene.controls.element != "jbar":
-            return
-        for part in self.scene.parts:
-            k = part.material.bulk_modulus
-            amplitude = indicators.alternation(self.space, indicators.element_pressure(self.space, state.u, k),
-                                               part.elements)
-            if amplitude > self.CHECKERED * part.material.shear_modulus:
-                log.warning("pressures of neighbouring elements alternate by %.3g MPa (above %g mu)%s: a checkerboard, "
-                            "with %.2g of the energy limiter; break up the rows of the mesh, or lower --bulk-modulus",
-                            amplitude, self.CHECKERED, self._where(part), amplitude**2 / (2 * k) / part.sink_law.phi)
-
-    def _where(self, part: Region) -> str:
-        """Of which material a warning speaks, if there are several."""
-        if len(self.scene.parts) == 1:
-            return ""
-        return f" in region {part.name}" if part.name else " outside of the regions"
 
     # --- during the event ---
     def check_step(self, state: State) -> None:
@@ -237,12 +218,12 @@ class Guard:
             raise InstabilityError(f"less than {self.DEAD:.0%} of the body is left at {self._when(state)}: this is no "
                                    f"crack but a mesh that dies of a bad state; {self._step_cure}")
         h = space.h[state.deleted]
-        coarse = h > l / self.COARSE
+        coarse = h > l / COARSE
         if coarse.sum() > max(2, 0.2 * h.size):
             e = int(np.flatnonzero(state.deleted)[np.argmax(h)])
             log.warning("the crack runs through elements of h = %.3g mm, l/h = %.2f (less than %g), near %s mm: its "
                         "width and U are those of the mesh there; refine it to h <= l/3", float(h.max()),
-                        l / float(h.max()), self.COARSE, place_text(space.X[space.conn[e]].mean(axis=0)))
+                        l / float(h.max()), COARSE, place_text(space.X[space.conn[e]].mean(axis=0)))
         if self.momentum.least_J < self.FLAT:
             self._check_shape(state)
 

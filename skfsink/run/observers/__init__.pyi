@@ -1,0 +1,11 @@
+from .crack import Crack as Crack
+from .frames import Frames as Frames
+from .guard import Guard as Guard
+from .history import Deletions as Deletions
+from .history import History as History
+from .observer import Observer as Observer
+from .onset import Onset as Onset
+from .onset import Strength as Strength
+from .progress import Checkpoint as Checkpoint
+from .progress import Progress as Progress
+from .view import View as View

@@ -1,0 +1,115 @@
+"""Frames of the fields for ParaView, of the loading and of the event, and which of them show the key moments."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ...fields.stress import pressure, von_mises
+from ...results.series import Series
+from ...system.files import prepare_folder
+from .observer import Observer
+from .view import View
+
+__all__ = ["Frames"]
+
+
+class Frames(Observer):
+    """Writes the series `run` of the event and `loading` of the way to it.
+
+    Memory: how many frames there are, and which are of key moments.
+
+    Parameters
+    ----------
+    every: time between frames of the event [s].   every_passes: passes between them in a quasi-static one.
+
+    Attributes
+    ----------
+    moments: frame number of each key moment: onset, branching, arrival, end.
+    times: of the frames of the event.   loading_times: of those of the loading.
+    """
+
+    LOADING = 50.0  # of the way of the loading: its frames are at least that part of it apart
+    kept = ("times", "loading_times", "moments", "framed")
+
+    def __init__(self, every: float, every_passes: int = 10) -> None:
+        self.every, self.every_passes = every, every_passes
+        self.times: list[float] = []
+        self.loading_times: list[float] = []
+        self.moments: dict[str, int] = {}
+        self.framed = 0.0  #: way of the loading at its last frame
+
+    def open(self, view: View, memory: Mapping[str, Any] | None = None) -> None:
+        """Take up the frames so far; OutputError where they are not there any more."""
+        super().open(view, memory)
+        self._new = memory is None
+        space, folder = view.body.space, view.folder / "series"
+        self.series, self.loading_series = Series(folder, "run", space), Series(folder, "loading", space)
+        self._regions = {"region": view.scene.region_numbers} if view.scene.regions else {}
+        self.series.check(len(self.times))
+        self.loading_series.check(len(self.loading_times))
+
+    def prepare(self, view: View) -> None:
+        """Drop what is left of later frames, or of another run."""
+        if self._new:
+            prepare_folder(view.folder / "series", overwrite=True)
+        self.series.resume(len(self.times))
+        self.loading_series.resume(len(self.loading_times))
+
+    def loading(self, view: View) -> None:
+        """A frame where the way of the loading asks for one."""
+        if view.way >= self.framed + max(1.0, self.framed / self.LOADING):
+            self.framed = view.way
+            self._add_to_loading(view)
+
+    def _add_to_loading(self, view: View) -> None:
+        self.loading_times.append(view.state.time)
+        self._add(self.loading_series, view)
+
+    def unfailed(self, view: View) -> None:
+        """Last frame of a run that ends without a failure."""
+        if not self.loading_times or self.loading_times[-1] != view.state.time:
+            self._add_to_loading(view)
+        self.moments = {"end": len(self.loading_times) - 1}
+        self._flush()
+
+    def due(self, view: View) -> bool:
+        """At key moments, and each time `every` is past."""
+        return bool(view.moment) or super().due(view)
+
+    def look(self, view: View) -> None:
+        """Add a frame."""
+        label = {"begin": "onset", "step": view.moment, "end": "end"}[view.occasion]
+        if label:
+            self.moments[label] = len(self.times)
+        self.times.append(view.state.time)
+        self._add(self.series, view)
+
+    def _add(self, series: Series, view: View) -> None:
+        momentum, space, state, stress = view.body.momentum, view.body.space, view.state, view.stress
+        series.add(
+            state.time,
+            {"displacement": state.u, "velocity": state.v, "gamma": state.gamma},
+            {"deleted": state.deleted.astype(np.int8), "W": space.element_mean(np.minimum(momentum.W, 1e3)),
+             "gamma_element": space.element_mean(momentum.gamma), "stress": stress, "pressure": pressure(stress),
+             "von_mises": von_mises(stress), "crushed": np.isnan(stress).any(axis=1).astype(np.int8), **self._regions})
+
+    def finish(self, view: View) -> None:
+        """Wait until all frames are written."""
+        self._flush()
+
+    def _flush(self) -> None:
+        self.series.flush()
+        self.loading_series.flush()
+
+    def close(self) -> None:
+        """Wait for the frame that is being written, whatever becomes of it."""
+        self.series.close()
+        self.loading_series.close()
+
+    def memory(self) -> dict[str, Any]:
+        """A checkpoint names its frames: they are written before it."""
+        self._flush()
+        return super().memory()

@@ -1,0 +1,59 @@
+"""What the loading has come to: the greatest load on the way, and the state at the onset."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..material_point import mean_deformation, mean_stress
+from .observer import Observer
+from .places import beginning, check_beginning, greatest_ratio
+from .view import View
+
+__all__ = ["Onset", "Strength"]
+
+
+class Strength(Observer):
+    """The greatest load of the loading, which is the strength of a body that is loaded evenly.
+
+    Memory: the greatest load so far.
+
+    Attributes
+    ----------
+    greatest: load, displacement, mean deformation gradient F and nominal stress P [MPa] where the load was greatest in
+        amount; empty before.
+    """
+
+    kept = ("greatest",)
+
+    def __init__(self) -> None:
+        self.greatest: dict[str, Any] = {}
+
+    def loading(self, view: View) -> None:
+        """Pushed or pulled, whichever was more."""
+        load, momentum = view.load, view.body.momentum
+        if abs(load) > abs(self.greatest.get("load", 0.0)):
+            self.greatest = {"load": load, "displacement_mm": view.displacement,
+                             "F": mean_deformation(momentum, view.state.u).tolist(),
+                             "P": mean_stress(momentum.space, view.reaction).tolist()}
+
+
+class Onset(Observer):
+    """Figures of the state at the onset, and a warning where it begins at a clamp, or away from a notch.
+
+    Memory: the `figures`; empty before the onset.
+    """
+
+    kept = ("figures",)
+
+    def __init__(self) -> None:
+        self.figures: dict[str, Any] = {}
+
+    def onset(self, view: View) -> None:
+        """Note the onset."""
+        state, ledger = view.state, view.state.ledger
+        ratio, place = greatest_ratio(view.body.density, state)
+        self.figures = {"displacement_mm": view.displacement, "reaction_N_per_mm": view.load,
+                        "elastic_energy": ledger.elastic, "gamma_min": float(state.gamma.min()), "sink": ledger.sink,
+                        "work": ledger.work, "loading_balance": ledger.balance, **beginning(view.scene, state),
+                        "ratio": ratio, "place_of_ratio": place.tolist()}
+        check_beginning(view.scene, state)

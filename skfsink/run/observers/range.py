@@ -1,0 +1,97 @@
+"""The range of the methods: a material, an element or a mesh beyond it is warned of before the run, and at the onset.
+
+Thresholds stand here; what they are based on is in `docs/stability.md`.
+"""
+
+from __future__ import annotations
+
+import logging
+
+import numpy as np
+
+from ...errors import place_text
+from ...fem import indicators
+from ...fem.space import Space
+from ...fields.state import State
+from ...material.regions import Region
+from ...scene.scene import Scene
+
+__all__ = ["COARSE", "check_onset", "check_pressure", "check_scene"]
+
+log = logging.getLogger(__name__)
+
+LOCKS = 50.0           # k/mu past which the plain element is warned of
+STIFF = 2e4            # k/mu past which rounding comes near the equilibria
+COARSE = 1.2           # l/h below which the mesh decides where and when it cracks
+NARROW = 0.1           # width of an element, of the median one, below which it governs the explicit step
+SHARP = 60.0           # degrees by which a notch may turn at one node
+CHECKERED = 0.1        # amplitude of an alternating pressure, of mu
+
+
+def check_scene(scene: Scene) -> None:
+    """Warn of a material, an element or a mesh beyond the range of the methods."""
+    space, l = scene.sample.space, scene.sink_law.length_scale
+    # the part that is least compressible for its shear modulus is the first to lock, and the first to lose digits
+    part = max(scene.parts, key=lambda part: part.material.bulk_modulus / part.material.shear_modulus)
+    ratio = part.material.bulk_modulus / part.material.shear_modulus
+    if scene.controls.element == "plain" and ratio > LOCKS:
+        log.warning("the plain element locks at k/mu = %.4g (above %g)%s: stiffness, onset load and U come out too "
+                    "high; take --element jbar", ratio, LOCKS, _where(scene, part))
+    if ratio > STIFF and scene.controls.element != "planestress":
+        log.warning("k/mu = %.3g%s is so large (above %g) that rounding comes near the tolerance of equilibria, "
+                    "and the explicit step falls with its root; with --bulk-modulus %.3g the solid is as good as "
+                    "incompressible", ratio, _where(scene, part), STIFF, 1e3 * part.material.shear_modulus)
+    h = float(space.h.min())
+    if h > l / COARSE:
+        log.warning("no element is finer than h = %.3g mm, l/h = %.2f (less than %g): onset and U are those of the "
+                    "mesh; refine it to h <= l/3, or raise --length-scale", h, l / h, COARSE)
+    angle, place = indicators.turning(space)
+    if angle > SHARP:
+        log.warning("a notch turns by %.0f degrees at one node, at %s mm (above %g): it is as sharp as elements "
+                    "are small, which moves onset and U; round it with at least 4 elements", angle,
+                    place_text(place), SHARP)
+    c = scene.controls
+    if c.analysis != "quasistatic" and c.integrator == "explicit":
+        _check_widths(space)
+
+def _check_widths(space: Space) -> None:
+    """Elements that cut the explicit step for all others."""
+    widths = indicators.widths(space)
+    typical, e = float(np.median(widths)), int(np.argmin(widths))
+    if widths[e] < NARROW * typical:
+        log.warning("an element near %s mm is %.2g mm narrow, most are %.2g mm (a share less than %g): it makes "
+                    "the explicit step that much shorter for all; mend the mesh there, or take --integrator hht",
+                    place_text(space.X[space.conn[e]].mean(axis=0)), widths[e], typical, NARROW)
+
+
+def check_onset(scene: Scene, state: State) -> None:
+    """Warn of a mesh that decides on the onset, and of pressures that alternate."""
+    space, l = scene.sample.space, scene.sink_law.length_scale
+    weakest = int(np.argmin(state.gamma))
+    h = indicators.size_near(space, weakest, l)
+    if h > l / COARSE:
+        log.warning("where it begins to fail, at %s mm, elements have h = %.3g mm, l/h = %.2f (less than %g): "
+                    "onset and U are those of the mesh; refine it there to h <= l/3, or raise --length-scale",
+                    place_text(space.X[weakest]), h, l / h, COARSE)
+    check_pressure(scene, state)
+
+
+def check_pressure(scene: Scene, state: State) -> None:
+    """Pressures that alternate, in each material for itself: they jump from one to another."""
+    if scene.controls.element != "jbar":
+        return
+    space = scene.sample.space
+    for part in scene.parts:
+        k = part.material.bulk_modulus
+        amplitude = indicators.alternation(space, indicators.element_pressure(space, state.u, k), part.elements)
+        if amplitude > CHECKERED * part.material.shear_modulus:
+            log.warning("pressures of neighbouring elements alternate by %.3g MPa (above %g mu)%s: a checkerboard, "
+                        "with %.2g of the energy limiter; break up the rows of the mesh, or lower --bulk-modulus",
+                        amplitude, CHECKERED, _where(scene, part), amplitude**2 / (2 * k) / part.sink_law.phi)
+
+
+def _where(scene: Scene, part: Region) -> str:
+    """Of which material a warning speaks, if there are several."""
+    if len(scene.parts) == 1:
+        return ""
+    return f" in region {part.name}" if part.name else " outside of the regions"

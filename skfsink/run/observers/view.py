@@ -1,0 +1,125 @@
+"""A run as its observers see it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from ...fields.body import Body
+from ...fields.crack import CrackTracker, Tips
+from ...fields.state import State
+from ...fields.stress import cauchy_stress
+from ...methods.integrators import Integrator
+from ...scene.scene import Scene
+from .gauge import Gauge
+
+__all__ = ["View"]
+
+
+@dataclass(eq=False)
+class View:
+    """A run at a moment: the scene, the state, and what follows from them. Observers change nothing in it.
+
+    Memory: all of it: the run moves it on with :meth:`at`.
+
+    Attributes
+    ----------
+    scene, folder, body: what is computed, where its files go, its balances.
+    state: the fields now.
+    reaction: internal force less the dead loads at its displacement, (n, dim) [N; N/mm in 2D].
+    dt: the last time step [s], 0 in statics.
+    before: time of the state at the step before [s], or number of the pass.
+    way: in loading, how far it has come, in its largest increments.
+    increment: the next load increment [s].   end: of the event at the latest [s].
+    occasion: "loading", or in the event "begin", "step" or "end".
+    integrator: of the dynamic event, if there is one.
+    tracker, tips: the crack, and its tips when it was last looked for.
+    moment: what has come with this step: "arrival", "branching", or "".
+    waiting: whether a body from rest in motion has not cracked yet, which may take thousands of records.
+    save: writes a checkpoint.   stop_asked: whether the run was asked to stop.
+    """
+
+    scene: Scene
+    folder: Path
+    body: Body
+    tracker: CrackTracker
+    tips: Tips
+    state: State
+    integrator: Integrator | None = None
+    reaction: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+    dt: float = 0.0
+    before: float = 0.0
+    way: float = 0.0
+    increment: float = 0.0
+    end: float = np.inf
+    occasion: str = "loading"
+    moment: str = ""
+    waiting: bool = False
+    save: Callable[[], None] = lambda: None
+    stop_asked: Callable[[], bool] = lambda: False
+
+    RARER = 50.0  # times the interval between two looks, while the run is waiting
+
+    def __post_init__(self) -> None:
+        self.now = self.state.time
+        self._stress: np.ndarray | None = None
+
+    @cached_property
+    def gauge(self) -> Gauge:
+        """What is reported as load and displacement."""
+        return Gauge(self.scene, self.body.loading)
+
+    @property
+    def load(self) -> float:
+        """The load [N; N/mm in 2D]."""
+        return self.gauge.load(self.reaction)
+
+    @property
+    def displacement(self) -> float:
+        """The displacement [mm]."""
+        return self.gauge.displacement(self.state)
+
+    @property
+    def quasistatic(self) -> bool:
+        """Whether the event is quasi-static: it counts passes, and has no time."""
+        return self.scene.controls.analysis == "quasistatic"
+
+    @property
+    def clock(self) -> str:
+        """What the time of the event counts: "s" or "pass"."""
+        return "pass" if self.quasistatic else "s"
+
+    @property
+    def stress(self) -> np.ndarray:
+        """Mean Cauchy stress of the elements [MPa], (ne, 6); see :func:`.cauchy_stress`."""
+        if self._stress is None:
+            self._stress = cauchy_stress(self.body.momentum, self.state.u)
+        return self._stress
+
+    @property
+    def stress_is_known(self) -> bool:
+        """Whether an observer before has asked for the stress of this state."""
+        return self._stress is not None
+
+    @property
+    def step_share(self) -> float:
+        """The step over its stability limit at this state; infinite where an integrator has none."""
+        return np.inf if self.integrator is None else self.integrator.step_share(self.state)
+
+    def at(self, state: State, reaction: np.ndarray, occasion: str = "loading", *, dt: float = 0.0,
+           way: float = 0.0) -> View:
+        """Move on to a state; see the attributes."""
+        self.before = state.time if occasion == "begin" else self.now
+        self.now = state.time
+        self.state, self.reaction, self.occasion, self.dt, self.way = state, reaction, occasion, dt, way
+        self.moment, self._stress = "", None
+        return self
+
+    def due(self, every: float) -> bool:
+        """Whether a multiple of `every` [s], or passes, has been passed in this step."""
+        step = (self.RARER if self.waiting else 1.0) * every
+        return int(self.state.time / step) != int(self.before / step)
