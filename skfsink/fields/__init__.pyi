@@ -7,4 +7,5 @@ from .momentum import Momentum as Momentum
 from .state import State as State
 from .stress import cauchy_stress as cauchy_stress
 from .stress import pressure as pressure
+from .stress import principal_stresses as principal_stresses
 from .stress import von_mises as von_mises

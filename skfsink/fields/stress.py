@@ -8,7 +8,7 @@ from ..fem.kernels.lanes import J_FLOOR
 from ..material import GeneralMaterial
 from .momentum import Momentum, Part
 
-__all__ = ["cauchy_stress", "pressure", "von_mises"]
+__all__ = ["cauchy_stress", "pressure", "principal_stresses", "von_mises"]
 
 _CHUNK = 8192                                   # elements at a time
 _VOIGT = ([0, 1, 2, 0, 1, 0], [0, 1, 2, 1, 2, 2])    # components xx, yy, zz, xy, yz, xz, in the order of VTK
@@ -82,3 +82,13 @@ def von_mises(stress: np.ndarray) -> np.ndarray:
     """sqrt(3/2 s:s) [MPa] of stresses (..., 6), s their deviator."""
     normal = stress[..., :3] + pressure(stress)[..., None]
     return np.asarray(np.sqrt(1.5 * (normal**2).sum(axis=-1) + 3.0 * (stress[..., 3:] ** 2).sum(axis=-1)))
+
+
+def principal_stresses(stress: np.ndarray) -> np.ndarray:
+    """Principal stresses (ne, 3) [MPa], ascending, of components as of :func:`cauchy_stress`; NaN where these are."""
+    tensor = np.zeros((len(stress), 3, 3))
+    tensor[:, _VOIGT[0], _VOIGT[1]] = tensor[:, _VOIGT[1], _VOIGT[0]] = stress
+    known = np.isfinite(stress).all(axis=1)
+    values = np.full((len(stress), 3), np.nan)
+    values[known] = np.linalg.eigvalsh(tensor[known])
+    return values

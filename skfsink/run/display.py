@@ -58,7 +58,7 @@ class Display:
             self.say(name)
 
     def update(self, fraction: float, figures: str) -> None:
-        """Show that `fraction` of the phase is done, and `figures` below it; before the first phase nothing is shown."""
+        """Show that `fraction` of the phase is done, and `figures` below it; nothing before the first one."""
         if self._task is None:
             return
         fraction = min(max(fraction, 0.0), 1.0)
