@@ -139,7 +139,7 @@ def test_an_observer_takes_the_place_of_a_standard_one(tmp_path: Path) -> None:
 
 
 def test_observers_that_cannot_be(tmp_path: Path) -> None:
-    """Fails if two observers share a name, or a run goes on without one that has a memory, or with one that lacks it."""
+    """Fails if two share a name, or a run goes on without one that has a memory, or with one that lacks it."""
     class Crack(Observer):
         """Not that of a run."""
 
