@@ -70,15 +70,15 @@ def free_motions(space: Space, free: np.ndarray, label: np.ndarray | None = None
         joined = _join(stiffness, members, modes)
     clusters, cluster = connected_components(joined, directed=False)
     for c in range(clusters):
-        own = np.flatnonzero(cluster == c)
-        columns = (own[:, None] * nm + np.arange(nm)).ravel()
+        joined = np.flatnonzero(cluster == c)
+        columns = (joined[:, None] * nm + np.arange(nm)).ravel()
         values, vectors = np.linalg.eigh(stiffness[np.ix_(columns, columns)])
-        nodes = np.concatenate([members[k] for k in own])
+        nodes = np.concatenate([members[k] for k in joined])
         if not held[nodes].any():
-            yield Motion(_named(space, label, own, count), "move", "", unheld=True)
+            yield Motion(_named(space, label, joined, count), "move", "", unheld=True)
             continue
-        null = vectors[:, values < RESISTED * values[-1]].T.reshape(-1, len(own), nm)
-        for i, piece in enumerate(own):
+        null = vectors[:, values < RESISTED * values[-1]].T.reshape(-1, len(joined), nm)
+        for i, piece in enumerate(joined):
             moving = null[:, i]
             if len(moving) and np.abs(moving).max() > 1e-6:
                 for name, cure in _names(moving, space.dim, centre, size):
@@ -151,10 +151,10 @@ def _place(x: np.ndarray) -> str:
     return place_text(np.round(x, 9) + 0.0)  # no -0
 
 
-def _named(space: Space, label: np.ndarray, own: np.ndarray, count: int) -> str:
-    if len(own) == count:
+def _named(space: Space, label: np.ndarray, joined: np.ndarray, count: int) -> str:
+    if len(joined) == count:
         return "the body"
-    elements = np.flatnonzero(np.isin(label, own))
+    elements = np.flatnonzero(np.isin(label, joined))
     middle = space.X[space.conn[elements]].mean(axis=(0, 1))
     return f"the piece of {len(elements)} elements around {_place(middle)} mm"
 

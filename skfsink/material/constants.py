@@ -55,15 +55,15 @@ def constant_names(law: str, text: str) -> set[str]:
 
 
 def _pairs(law: str, text: str) -> dict[str, Any]:
-    own = [field.name for field in fields(MATERIALS[law]) if field.name not in COMMON]
-    known = [*own, *MODULI]
+    constants = [field.name for field in fields(MATERIALS[law]) if field.name not in COMMON]
+    known = [*constants, *MODULI]
     found: dict[str, Any] = {}
     for part in filter(str.strip, text.split(",")):
         name, equals, value = (piece.strip() for piece in part.partition("="))
         name = "nu" if name == "ν" else name
         if not equals or name not in known:
             comma = "; decimals stand after a point" if found and part.strip()[:1].isdigit() else ""
-            raise ParameterError(f"constants must be name = value pairs between commas, of {', '.join(own)} for "
+            raise ParameterError(f"constants must be name = value pairs between commas, of {', '.join(constants)} for "
                                  f"{law}, or E, G and nu; got {part.strip()!r}{comma}")
         if name in found:
             raise ParameterError(f"constants: {name} is there twice")
@@ -75,7 +75,7 @@ def _pairs(law: str, text: str) -> dict[str, Any]:
 
 
 def _from_moduli(law: str, found: Mapping[str, Any]) -> dict[str, Any]:
-    own = {name: value for name, value in found.items() if name not in MODULI}
+    constants = {name: value for name, value in found.items() if name not in MODULI}
     if law not in FROM_SHEAR:
         raise ParameterError(f"constants: E, G and nu are for isotropic laws; {law} has fibres: give its own constants")
     shear, other = FROM_SHEAR[law]
@@ -96,14 +96,14 @@ def _from_moduli(law: str, found: Mapping[str, Any]) -> dict[str, Any]:
     if stiff and stiff[0] != shear:
         G = found["G"] if "G" in found else found["E"] / (2 * (1 + found["nu"]))
         defaults = {field.name: field.default for field in fields(MATERIALS[law])}
-        own[shear] = other(G, {**defaults, **own})
-        if own[shear] <= 0:
-            raise ParameterError(f"constants: {shear} of {law} would be {own[shear]:g} MPa, and must be > 0: the shear "
-                                 f"modulus {G:g} MPa is 2 (c1 + c2)")
+        constants[shear] = other(G, {**defaults, **constants})
+        if constants[shear] <= 0:
+            raise ParameterError(f"constants: {shear} of {law} would be {constants[shear]:g} MPa, and must be > 0: the "
+                                 f"shear modulus {G:g} MPa is 2 (c1 + c2)")
     if "nu" in found:
-        G, nu = material_from(law, own).shear_modulus, found["nu"]
-        own["bulk_modulus"] = 2 * G * (1 + nu) / (3 * (1 - 2 * nu))
-    return own
+        G, nu = material_from(law, constants).shear_modulus, found["nu"]
+        constants["bulk_modulus"] = 2 * G * (1 + nu) / (3 * (1 - 2 * nu))
+    return constants
 
 
 def own_constants(law: str, text: str) -> tuple[str, float | None]:

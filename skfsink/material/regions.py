@@ -138,8 +138,8 @@ def by_element(n_elements: int, rest: float, regions: Sequence[Region],
     return values
 
 
-def one_bulk_modulus(of_nu: float | None, given: float | None) -> None:
+def one_bulk_modulus(of_nu: float | None, bulk_modulus: float | None) -> None:
     """Refuse a bulk modulus that is given beside a Poisson ratio, from which it follows (ParameterError)."""
-    if of_nu is not None and given is not None:
-        raise ParameterError(f"bulk_modulus {given:g} MPa and the nu of the constants ({of_nu:.6g} MPa) say the same: "
-                             f"give one of them")
+    if of_nu is not None and bulk_modulus is not None:
+        raise ParameterError(f"bulk_modulus {bulk_modulus:g} MPa and the nu of the constants ({of_nu:.6g} MPa) say the "
+                             f"same: give one of them")

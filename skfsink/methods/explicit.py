@@ -136,13 +136,13 @@ class Explicit:
         self.reaction, self._spare = force, old
         ledger = state.ledger
         elastic = self.momentum.energy
-        fed, scale = dt * dt / 8 * swing + (elastic - self._elastic) - trapezoid, ledger.initial
+        energy_fed_in, scale = dt * dt / 8 * swing + (elastic - self._elastic) - trapezoid, ledger.initial
         if dead is not None and before is not None:
-            fed -= dead.effort(before, du)
+            energy_fed_in -= dead.effort(before, du)
             ledger.work += dead.changed(before, state.u - 0.5 * du)
             ledger.loads, scale = self.momentum.loads, max(abs(scale), elastic + kinetic)
-        ledger.numerical -= fed
-        if fed > self.FED_IN * scale:  # first sign of a step that has become too long
+        ledger.numerical -= energy_fed_in
+        if energy_fed_in > self.FED_IN * scale:  # first sign of a step that has become too long
             self._urgent = True
         ledger.work += held
         ledger.elastic = self._elastic = elastic

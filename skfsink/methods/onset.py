@@ -22,6 +22,7 @@ from ..fields.body import Body
 from ..fields.density import Density
 from ..fields.state import State
 from .controls import StaticsControls
+from .load_time import LoadTime
 from .newton import Newton
 
 __all__ = ["StaticLoading"]
@@ -67,6 +68,7 @@ class StaticLoading:
         self.body, self.momentum, self.density, self.loading = body, body.momentum, body.density, body.loading
         self.controls = controls or StaticsControls()
         self.space, self.free = body.space, body.free
+        self.clock = LoadTime(self.loading, body.size, self.momentum.material.shear_modulus, self.controls.increment)
         self.newton = Newton(self.momentum, self.free, self.controls.tolerance, self.controls.max_newton, body.threads)
         self.increment = 0.0      #: current load increment, as load time [s]; 0 before the first
         self.refused = ""         #: why the last increment was given up: "no equilibrium", "runs away", "passes",
@@ -95,35 +97,6 @@ class StaticLoading:
         The dead loads are those last given to the momentum balance.
         """
         return self.newton.predict(u, self.loading.velocity(t) * increment)
-
-    # --- load time ---
-    def _longest(self, t: float) -> float:
-        """The largest increment of the load time from `t` on, infinity if nothing moves up to the next knot [s]."""
-        speed, pull, increment = self.loading.speed(t), self.loading.pull(t), self.controls.increment
-        by_grips = increment * self.body.size / speed if speed > 0.0 else np.inf
-        return min(by_grips, increment * 2.0 * self.momentum.material.shear_modulus / pull if pull > 0.0 else np.inf)
-
-    def way(self, t: float) -> float:
-        """Length of the way to load time `t`, in the largest increments; the measure of the load."""
-        total, start = 0.0, 0.0
-        while start < t:
-            end = min(self.loading.knot(start), t)
-            total += (end - start) / self._longest(start)
-            start = end
-        return total
-
-    def _age(self, t: float) -> float:
-        """Time the way to load time `t` would have taken at the rates from `t` on: `t` itself without ramps [s]."""
-        return self.way(t) * self._longest(t) if self.loading.knots else t
-
-    def past(self, t: float, share: float) -> float:
-        """The load time at which the load has grown by `share` since load time `t` [s]."""
-        return t + share * self._age(t) if self.loading.knots else t * (1.0 + share)
-
-    def _end(self, t: float, increment: float) -> float:
-        """Load time after an increment from `t` on: no later than the next knot, which is hit exactly [s]."""
-        knot = self.loading.knot(t)
-        return knot if knot - t <= 1.001 * increment else t + increment
 
     # --- both fields ---
     def _settle(self, state: State, u: np.ndarray) -> _Settled | None:
@@ -198,8 +171,8 @@ class StaticLoading:
         growth, loss = self._growth(state, settled, force)
         if growth > self.SOFT[0] and loss < self.SOFT[1]:
             return ""
-        way = self._age(state.grip + increment)
-        fine = max(self.FINE[0] * self._longest(state.grip), self.controls.onset_tolerance * way)
+        way = self.clock.age(state.grip + increment)
+        fine = max(self.FINE[0] * self.clock.longest(state.grip), self.controls.onset_tolerance * way)
         if increment > min(fine, self.FINE[1] * way):
             return "softens"
         return "" if growth > 0.0 or self.stable(state, settled) else "unstable"
@@ -224,13 +197,13 @@ class StaticLoading:
         force = self.momentum.force(state.u)
         W = self.momentum.W
         while not self._beyond(state, W):
-            longest = self._longest(state.grip)
+            longest = self.clock.longest(state.grip)
             if longest == np.inf:
                 state.grip = state.time = self.loading.knot(state.grip)
                 self.momentum.set_time(state.grip)
                 continue
             self.increment = self.increment or longest
-            end = self._end(state.grip, self.increment)
+            end = self.clock.end(state.grip, self.increment)
             increment = self.increment if end == state.grip + self.increment else end - state.grip
             before = None if dead is None else dead.values
             self.momentum.set_time(end)
@@ -247,7 +220,7 @@ class StaticLoading:
                 if state.step == 0 and self.increment < self.LEAST * longest:
                     raise ConvergenceError("the body finds no equilibrium under the smallest load increment")
                 if (state.step and self.refused != "softens"  # which has a shorter increment that is taken
-                        and self.increment <= c.onset_tolerance * (self._age(state.grip) + self.increment)):
+                        and self.increment <= c.onset_tolerance * (self.clock.age(state.grip) + self.increment)):
                     self._doubt()
                     self.momentum.set_gamma(state.gamma, state.deleted)
                     self.momentum.force(state.u)
@@ -281,7 +254,7 @@ class StaticLoading:
         """Whether there is nothing more to load, or no sense in it; `unfailed` takes the reason."""
         live = self.momentum.effective(state.gamma, state.deleted) > 0  # not those of an increment given up
         over = float((W / self.density.phi)[live].min(initial=np.inf))
-        if self._longest(state.grip) == np.inf and self.loading.knot(state.grip) == np.inf:
+        if self.clock.longest(state.grip) == np.inf and self.loading.knot(state.grip) == np.inf:
             self.unfailed = f"nothing moves after load time {state.grip:.4g} s"
         elif over > self.OVER:
             self.unfailed = f"every point is past its energy limiter, by W/Phi = {over:.3g} and more"

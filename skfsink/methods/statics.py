@@ -48,7 +48,7 @@ class Statics(StaticLoading):
             There is no equilibrium, as under dead loads alone; or points wait that are never let go.
         """
         ledger, dead = state.ledger, self.momentum.dead
-        furthest, idle, self.arrested = limit * self.way(state.grip), 0, ""
+        furthest, idle, self.arrested = limit * self.clock.way(state.grip), 0, ""
         self.momentum.set_time(state.grip)
         if state.step == 0:
             self.momentum.set_gamma(state.gamma, state.deleted)
@@ -62,7 +62,7 @@ class Statics(StaticLoading):
                 if not self._advance(state, advance):
                     self.arrested = f"nothing moves after load time {state.grip:.4g} s"
                     return
-                if self.way(state.grip) > furthest:
+                if self.clock.way(state.grip) > furthest:
                     self.arrested = f"the grips are at {limit:g} times their way to the onset"
                     return
             else:
@@ -112,9 +112,9 @@ class Statics(StaticLoading):
         have found their new ways, most of them are relieved. How far is W/Phi, with the limiter of each material.
         """
         ratio, live = W / self.density.phi, self.momentum.gamma > 0
-        past = (ratio > 1) & (state.W_max < W)
-        waiting = past & (self.controls.front * float(ratio[live].max(initial=0.0)) > ratio)
-        if waiting.any() and not self._fails(state, np.where(past & ~waiting, W, state.W_max)):
+        past_limiter = (ratio > 1) & (state.W_max < W)
+        waiting = past_limiter & (self.controls.front * float(ratio[live].max(initial=0.0)) > ratio)
+        if waiting.any() and not self._fails(state, np.where(past_limiter & ~waiting, W, state.W_max)):
             most = float(ratio[waiting & live].max(initial=0.0))  # the one they wait for has failed long ago
             waiting &= self.controls.front * most > ratio
         state.W_max = np.where(waiting, state.W_max, np.maximum(state.W_max, W))
@@ -131,14 +131,14 @@ class Statics(StaticLoading):
         False if nothing moves any more.
         """
         held, dead = ~self.free.reshape(state.u.shape), self.momentum.dead
-        while self._longest(state.grip) == np.inf:
+        while self.clock.longest(state.grip) == np.inf:
             knot = self.loading.knot(state.grip)
             if knot == np.inf:
                 return False
             state.grip = knot
         force = self.momentum.force(state.u)
-        increment = share * self._age(state.grip)
-        end = self._end(state.grip, increment)
+        increment = share * self.clock.age(state.grip)
+        end = self.clock.end(state.grip, increment)
         increment = increment if end == state.grip + increment else end - state.grip
         before = None if dead is None else dead.values
         self.momentum.set_time(end)

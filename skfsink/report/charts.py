@@ -53,7 +53,7 @@ def speed_chart(runs: Sequence[Run], labels: Sequence[str],
     """
     figure = Figure(_SIZE, layout="constrained")
     ax = figure.subplots()
-    said, drawn = [], []
+    sentences, drawn = [], []
     for run, label, look in _lines(runs, labels):
         event = run.event
         if run.analysis != "dynamic" or len(event["time_s"]) < 2:
@@ -61,18 +61,18 @@ def speed_chart(runs: Sequence[Run], labels: Sequence[str],
         speed = event["tip_speed_m_per_s"]
         ax.plot(event["time_s"] * 1e6, speed, **look)
         drawn.append((waves[list(labels).index(label)], look["color"]))
-        said.append(f"{label}: at most {np.nanmax(speed):.3g} m/s")
-    if not said:
+        sentences.append(f"{label}: at most {np.nanmax(speed):.3g} m/s")
+    if not sentences:
         return None
     known = {pair for pair, _ in drawn if pair is not None}
     for pair in sorted(known):
         colour = "0.25" if len(known) == 1 else next(colour for wave, colour in drawn if wave == pair)
         for value, name, dashes in zip(pair, ("c_s", "c_R"), ("-", "--")):
             ax.axhline(value, color=colour, linewidth=0.8, linestyle=dashes, label=f"${name}$ = {value:.1f} m/s")
-        said.append(f"shear wave speed c_s {pair[0]:.3g} m/s, Rayleigh wave speed c_R {pair[1]:.3g} m/s")
+        sentences.append(f"shear wave speed c_s {pair[0]:.3g} m/s, Rayleigh wave speed c_R {pair[1]:.3g} m/s")
     ax.set(xlabel="time since onset (µs)", ylabel="speed of the leading tip (m/s)", ylim=(0, None), xmargin=0)
     figure.legend(loc="outside upper left", ncols=3)
-    return Chart(_svg(figure), "Speed of the leading tip over time. " + "; ".join(said) + ".")
+    return Chart(_svg(figure), "Speed of the leading tip over time. " + "; ".join(sentences) + ".")
 
 
 @matplotlib.rc_context(_SVG)
@@ -81,7 +81,7 @@ def energy_chart(runs: Sequence[Run], labels: Sequence[str]) -> Chart | None:
     grew."""
     figure = Figure(_SIZE, layout="constrained")
     axes = figure.subplots(1, 2, sharex=True)
-    said = []
+    sentences = []
     for run, label, look in _lines(runs, labels, "U_paper"):
         event = run.event
         length = event["crack_length_mm"]
@@ -92,15 +92,15 @@ def energy_chart(runs: Sequence[Run], labels: Sequence[str]) -> Chart | None:
         for ax, name, values in zip(axes, "UD", parts):
             ax.plot(length, values, **look)
             ax.set(title=f"${name}$", xlabel="length of the crack (mm)")
-        said.append(f"{label}: U {parts[0][-1]:.3g}, D {parts[1][-1]:.3g} {unit} at the end")
-    if not said:
+        sentences.append(f"{label}: U {parts[0][-1]:.3g}, D {parts[1][-1]:.3g} {unit} at the end")
+    if not sentences:
         return None
     for ax in axes:  # not before all lines are drawn, which would leave out what goes beyond the first
         ax.set(xlim=(0, None), ylim=(0, None))
     axes[0].set_ylabel(f"energy ({_unit(runs, 'U_paper')})")
     if len(runs) > 1:
         figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper left", ncols=3)
-    return Chart(_svg(figure), "U and D over the length of the crack. " + "; ".join(said) + ".")
+    return Chart(_svg(figure), "U and D over the length of the crack. " + "; ".join(sentences) + ".")
 
 
 @matplotlib.rc_context(_SVG)
@@ -108,7 +108,7 @@ def loading_chart(runs: Sequence[Run], labels: Sequence[str]) -> Chart | None:
     """Load over the displacement of the grips up to the onset; None if no run was loaded in more than one step."""
     figure = Figure((_SIZE[0], 2.6), layout="constrained")
     ax = figure.subplots()
-    said = []
+    sentences = []
     for run, label, look in _lines(runs, labels, "reaction_N_per_mm"):
         rows = run.history["phase"] == "loading"
         if rows.sum() < 2:
@@ -116,14 +116,14 @@ def loading_chart(runs: Sequence[Run], labels: Sequence[str]) -> Chart | None:
         x, y = (run.history[name][rows] for name in ("grip_displacement_mm", "reaction_N_per_mm"))
         unit = run.history.units["reaction_N_per_mm"]
         ax.plot(np.append(0, x), np.append(0, y), marker=".", **look)
-        said.append(f"{label}: {y[-1]:.3g} {unit} at {x[-1]:.3g} mm")
-    if not said:
+        sentences.append(f"{label}: {y[-1]:.3g} {unit} at {x[-1]:.3g} mm")
+    if not sentences:
         return None
     ax.set(ylabel=f"load ({_unit(runs, 'reaction_N_per_mm')})", xlabel="displacement of the grips (mm)",
            xlim=(0, None), ylim=(0, None))
     if len(runs) > 1:
         figure.legend(loc="outside upper left", ncols=3)
-    return Chart(_svg(figure), "Load over displacement up to the onset. " + "; ".join(said) + ".")
+    return Chart(_svg(figure), "Load over displacement up to the onset. " + "; ".join(sentences) + ".")
 
 
 def _svg(figure: Figure) -> bytes:

@@ -173,9 +173,9 @@ def store_coarse(run: Path, case: str) -> Path:
 
 
 def _read(run: Path, number: int, time: float, dim: int) -> Frame:
-    said = io.StringIO()
+    printed = io.StringIO()
     try:
-        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):  # meshio prints, and exits
+        with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed):  # meshio prints, and exits
             return read_frame(run / "series" / frame_file("run", number), time, "", dim)
     except (Exception, SystemExit) as error:
         reason = str(error) if isinstance(error, Exception) else "it cannot be read"

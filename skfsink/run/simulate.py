@@ -29,7 +29,7 @@ from .observers.guard import Guard
 from .observers.history import Deletions, History
 from .observers.observer import Observer, Observers
 from .observers.onset import Onset, Strength
-from .observers.places import check_arrival, said
+from .observers.places import check_arrival, onset_text
 from .observers.progress import Checkpoint, Progress
 from .observers.range import check_scene
 from .observers.view import View
@@ -160,14 +160,14 @@ class Simulation:
         loading: LoadingFromRest | Statics = self._from_rest or self.statics
         for _ in loading.load(state):
             view.increment = loading.increment
-            self.observers.loading(view.at(state, self.momentum.force(state.u), way=self.statics.way(state.grip)))
+            self.observers.loading(view.at(state, self.momentum.force(state.u), way=self.statics.clock.way(state.grip)))
             self.observers.pause(view)
         self.costs.lap("loading")
 
     def _begin_event(self) -> None:
         """Start a new ledger at the onset, from rest just past it unless the body has come there in motion."""
         state, overshoot = self.state, 0.0 if self._from_rest else self.scene.controls.overshoot
-        state.begin_event(overshoot, self.statics.past(state.grip, overshoot))
+        state.begin_event(overshoot, self.statics.clock.grown(state.grip, overshoot))
         reaction = self.body.take(state)
         if self.scene.controls.analysis == "quasistatic":
             state.ledger.elastic, state.ledger.loads = self.momentum.energy, self.momentum.loads
@@ -178,7 +178,7 @@ class Simulation:
                 self.costs.factorisations += self.integrator.factorisations
             self._make_integrator().begin(state)
         self.observers.begin(self.view.at(state, reaction, "begin"))
-        self.display.say(said(self.onset.figures))
+        self.display.say(onset_text(self.onset.figures))
 
     def _make_integrator(self) -> Integrator:
         c = self.scene.controls

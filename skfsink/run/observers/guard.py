@@ -170,10 +170,10 @@ class Guard(Observer):
             Energy has been fed in, or is no number; too much failed at once; a live point is inside out.
         """
         ledger = state.ledger
-        fed = -ledger.numerical / ledger.scale(self.scale)
+        energy_fed_in = -ledger.numerical / ledger.scale(self.scale)
         allowed = self.scene.controls.balance_tolerance
-        if not (fed <= allowed and np.isfinite(ledger.elastic + ledger.kinetic)):
-            raise InstabilityError(f"energy fed in by the integrator {fed:.2%} of the onset energy at "
+        if not (energy_fed_in <= allowed and np.isfinite(ledger.elastic + ledger.kinetic)):
+            raise InstabilityError(f"energy fed in by the integrator {energy_fed_in:.2%} of the onset energy at "
                                    f"{self._when(state)}, allowed {allowed:.2%}: {self._step_cure}; only then raise "
                                    f"--balance-tolerance")
         before, self._deleted = self._deleted, len(state.deletions)

@@ -21,7 +21,7 @@ from ...fields.state import State
 from ...loads.grips import Grip, Ramp
 from ...scene.scene import Scene
 
-__all__ = ["beginning", "check_arrival", "check_beginning", "greatest_ratio", "rim_of", "said", "symmetry_planes"]
+__all__ = ["beginning", "check_arrival", "check_beginning", "greatest_ratio", "onset_text", "rim_of", "symmetry_planes"]
 
 log = logging.getLogger(__name__)
 
@@ -121,7 +121,7 @@ def _distance(X: np.ndarray, x: np.ndarray) -> float:
     return float(np.linalg.norm(X - x, axis=1).min())
 
 
-def said(onset: dict[str, Any]) -> str:
+def onset_text(onset: dict[str, Any]) -> str:
     """The onset in words."""
     x, boundary = place_text(onset["place_mm"]), onset["boundary"]
     where = {"everywhere": "everywhere at once, most", "inside": "inside,", "surface": "at its surface,"}.get(
