@@ -2,9 +2,9 @@
 
 import lazy_loader
 
-from ._version import __version__ as __version__
 from .system.moved import follow_moves
 from .system.scratch import place_matplotlib
+from .system.version import __version__ as __version__
 
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 __all__ = [*__all__, "__version__"]

@@ -1,4 +1,3 @@
-from ._version import __version__ as __version__
 from .cases.custom import custom as custom
 from .loads.grips import Grip as Grip
 from .loads.grips import Ramp as Ramp
@@ -20,3 +19,4 @@ from .results.result import Result as Result
 from .scene.deck import read_deck as read_deck
 from .scene.options import Options as Options
 from .system.shipped import data_folder as data_folder
+from .system.version import __version__ as __version__

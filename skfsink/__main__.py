@@ -6,8 +6,8 @@ import importlib
 
 from cyclopts import App, Group
 
-from ._version import __version__
 from .cli.program import run
+from .system.version import __version__
 
 __all__ = ["main"]
 

@@ -12,8 +12,8 @@ from typing import Any, NoReturn
 from cyclopts import App, ArgumentCollection, Group
 from cyclopts.exceptions import CycloptsError
 
-from .._version import __version__
 from ..errors import Interrupted, SkfsinkError
+from ..system.version import __version__
 
 __all__ = ["command", "run"]
 

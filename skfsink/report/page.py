@@ -11,10 +11,10 @@ from pathlib import Path
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from .._version import __version__
 from ..errors import OutputError, SkfsinkError
 from ..results.loader import Run, load
 from ..system.files import reported, write_atomic
+from ..system.version import __version__
 from . import charts
 from .citation import BIBTEX, CITATIONS, DOI
 from .scenes import command_line, differences, parameter_table, run_labels

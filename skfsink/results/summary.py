@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from .._version import __version__
 from ..errors import OutputError
 from ..system.files import write_atomic
+from ..system.version import __version__
 
 __all__ = ["SUMMARY", "read_summary", "versions", "write_summary"]
 

@@ -10,10 +10,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .._version import __version__
 from ..errors import CheckpointError
 from ..fields.state import State
 from ..system.files import write_atomic
+from ..system.version import __version__
 
 __all__ = ["Stored", "load_checkpoint", "load_state", "save_checkpoint", "save_state"]
 

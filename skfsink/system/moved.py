@@ -35,11 +35,11 @@ class _Moves(MetaPathFinder, Loader):
         now = f"skfsink.{OLD[spec.name.partition('.')[2]]}"
         warnings.warn(f"{spec.name} is {now} now; the old name goes with version 1.0", DeprecationWarning, stacklevel=2)
         module = importlib.import_module(now)
-        self._own = module.__spec__
+        self._spec = module.__spec__
         return module
 
     def exec_module(self, module: ModuleType) -> None:
-        module.__spec__ = self._own  # the import system has put that of the old name there
+        module.__spec__ = self._spec  # the import system has put that of the old name there
 
 
 def follow_moves() -> None:
