@@ -26,6 +26,7 @@ from skfsink.report import charts, citation, report_page, write_report
 from skfsink.report.scenes import command_line, run_labels
 from skfsink.results.history import HISTORY_COLUMNS, History
 from skfsink.results.loader import ENERGIES, FIELD_UNITS
+from skfsink.system import shipped
 from skfsink.system.shipped import data_folder
 
 PACKAGE = Path(skfsink.__file__).parent
@@ -221,7 +222,8 @@ def test_the_page_of_one_run_has_everything_in_it(folder: Path) -> None:
         "data:image/png": 4, "data:image/gif": 1, "data:image/svg+xml": 3}
     speed = next(str(image["alt"]) for image in images if str(image["alt"]).startswith("Speed of the leading tip"))
     assert "shear wave speed c_s 29.3 m/s, Rayleigh wave speed c_R 28 m/s" in speed
-    for expected in (citation.DOI, "Cost", "Versions and machine", f"<td>{run.summary['versions']['numpy']}</td>",
+    for expected in ("doi:10.1115/1.4055670", "Cost", "Versions and machine",
+                     f"<td>{run.summary['versions']['numpy']}</td>",
                      f"<td>{run.summary['energy']['U_paper_at_arrival']:.4g}</td>", *run.assumed,
                      "Characteristic length l of damage [mm]", "--length-scale 0.6"):
         assert expected.replace("&", "&amp;") in text
@@ -302,20 +304,33 @@ def test_plates_beside_bodies_in_space_keep_their_units() -> None:
     assert text.count("the folder holds no pictures") == 2
 
 
-def test_citation_is_that_of_the_file() -> None:
-    """Fails if CITATION.cff and what a report prints are not the same."""
-    path = PACKAGE.parent / "CITATION.cff"
-    if not path.is_file():
-        pytest.skip("CITATION.cff is in a checkout only")
-    text, printed = path.read_text(), " ".join(citation.CITATIONS) + citation.BIBTEX
+def test_citation_is_that_of_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fails if a report prints anything else than CITATION.cff has, or the file names another version than this."""
+    text = shipped.citation_file().read_text(encoding="utf-8")
+    printed = " ".join(citation.citations()) + citation.bibtex()
     found = re.findall(r'^\s*(?:- )?(title|version|family-names|given-names|journal|doi): "?([^"\n]+)"?$', text, re.M)
-    assert len(found) == 11
+    assert len(found) == 11 and ("version", skfsink.__version__) in found
     for name, value in found:
         if name != "given-names":
             assert printed.count(value) >= 2, value
         else:
             assert value in printed
-    assert re.search(r'date-released: "(\d+)', text)[1] in citation.CITATIONS[0]  # type: ignore[index]
+    assert re.search(r'date-released: "(\d+)', text)[1] in citation.citations()[0]  # type: ignore[index]
+    (tmp_path / "CITATION.cff").write_text(text.replace("Jabareen", "Someone"), encoding="utf-8")
+    monkeypatch.setattr(citation, "citation_file", lambda: tmp_path / "CITATION.cff")
+    citation._entries.cache_clear()
+    try:
+        assert "Someone, Mahmood" in citation.bibtex() and "Jabareen" not in citation.bibtex()
+    finally:
+        citation._entries.cache_clear()
+
+
+def test_references_as_text_and_bibtex() -> None:
+    """Fails if initials, the comma before `and`, the braces of an organisation or the key of an entry are wrong."""
+    assert citation.citations()[1].startswith("Abu-Qbeitah, S., Jabareen, M., and Volokh, K. Y. Dynamic Versus")
+    for line in ("@software{skfsink,\n", "  author  = {{The skfsink developers}},\n", "@article{AbuQbeitah2022,\n",
+                 "  author  = {Abu-Qbeitah, Suhib and Jabareen, Mahmood and Volokh, Konstantin Y.},\n"):
+        assert line in citation.bibtex()
 
 
 def run_command(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[Any, str, str]:

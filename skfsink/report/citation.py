@@ -1,33 +1,57 @@
-"""How to cite: the program and the paper, as in CITATION.cff."""
+"""How to cite: the program and the paper whose theory and examples it computes, as CITATION.cff has them."""
 
 from __future__ import annotations
 
-from ..system.version import __version__
+from collections.abc import Mapping
+from functools import cache
+from typing import Any
 
-__all__ = ["BIBTEX", "CITATIONS", "DOI"]
+from ..system.shipped import citation_file
 
-DOI = "10.1115/1.4055670"
-_YEAR = 2026
-_TITLE = "skfsink: dynamic versus quasi-static crack propagation in soft materials by the material-sink theory"
-_PAPER = "Dynamic Versus Quasi-Static Analysis of Crack Propagation in Soft Materials"
+__all__ = ["bibtex", "citations"]
 
-#: References as text: the program, then the paper whose theory and examples it computes.
-CITATIONS = (
-    f"The skfsink developers. {_TITLE}. Version {__version__}, {_YEAR}.",
-    f"Abu-Qbeitah, S., Jabareen, M., and Volokh, K. Y. {_PAPER}. Journal of Applied Mechanics, 2022. doi:{DOI}",
-)
-BIBTEX = f"""@software{{skfsink,
-  author  = {{{{The skfsink developers}}}},
-  title   = {{{_TITLE}}},
-  version = {{{__version__}}},
-  year    = {{{_YEAR}}}
-}}
 
-@article{{AbuQbeitah2022,
-  author  = {{Abu-Qbeitah, Suhib and Jabareen, Mahmood and Volokh, Konstantin Y.}},
-  title   = {{{_PAPER}}},
-  journal = {{Journal of Applied Mechanics}},
-  year    = {{2022}},
-  doi     = {{{DOI}}}
-}}
-"""
+def citations() -> tuple[str, ...]:
+    """References as text: the program, then the works that CITATION.cff refers to."""
+    program, *works = _entries()
+    return (f"{_listed(program)}. {program['title']}. Version {program['version']}, {program['year']}.",
+            *(f"{_listed(work)} {work['title']}. {work['journal']}, {work['year']}. doi:{work['doi']}"
+              for work in works))
+
+
+def bibtex() -> str:
+    """The same references as entries of BibTeX."""
+    program, *works = _entries()
+    name = program["title"].partition(":")[0]
+    entries = [_bibtex("software", name, program, ("author", "title", "version", "year"))]
+    for work in works:
+        first = "".join(filter(str.isalpha, work["authors"][0]["family-names"]))
+        names = ("author", "title", "journal", "year", "doi")
+        entries.append(_bibtex("article", f"{first}{work['year']}", work, names))
+    return "\n".join(entries)
+
+
+@cache
+def _entries() -> tuple[Mapping[str, Any], ...]:
+    """The program and the works it refers to, each with its year."""
+    import yaml  # only reports need it
+
+    program = yaml.safe_load(citation_file().read_text(encoding="utf-8"))
+    program["year"] = str(program["date-released"])[:4]
+    return program, *program.get("references", ())
+
+
+def _listed(entry: Mapping[str, Any]) -> str:
+    """Authors as in a list of references: "Jabareen, M., and Volokh, K. Y."."""
+    *others, last = (author.get("name") or f"{author['family-names']}, " + " ".join(
+        f"{given[0]}." for given in author["given-names"].split()) for author in entry["authors"])
+    return ", ".join([*others, f"and {last}" if others else last])
+
+
+def _bibtex(kind: str, key: str, entry: Mapping[str, Any], names: tuple[str, ...]) -> str:
+    authors = " and ".join(f"{{{author['name']}}}" if "name" in author else
+                           f"{author['family-names']}, {author['given-names']}" for author in entry["authors"])
+    values = {**entry, "author": authors}
+    width = max(map(len, names))
+    rows = ",\n".join(f"  {name:<{width}} = {{{values[name]}}}" for name in names)
+    return f"@{kind}{{{key},\n{rows}\n}}\n"

@@ -16,7 +16,7 @@ from ..results.loader import Run, load
 from ..system.files import reported, write_atomic
 from ..system.version import __version__
 from . import charts
-from .citation import BIBTEX, CITATIONS, DOI
+from .citation import bibtex, citations
 from .scenes import command_line, differences, parameter_table, run_labels
 from .tables import EMPTY, Row, Table, cost_table, energy_tables, key_table, version_table
 
@@ -114,7 +114,7 @@ def report_page(asked: Sequence[Run]) -> str:
         parts=parts, titles={title for part in parts for title in part.pictures},
         differences=differences(runs, labels) if several else None,
         same_assumed=len({run.assumed for run in runs}) == 1, cost=cost_table(runs, labels),
-        versions=version_table(runs, labels), citations=CITATIONS, bibtex=BIBTEX, doi=DOI, version=__version__)
+        versions=version_table(runs, labels), citations=citations(), bibtex=bibtex(), version=__version__)
 
 
 def _title(asked: Sequence[Run]) -> str:

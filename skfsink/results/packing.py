@@ -3,6 +3,9 @@
 Displacement, gamma and velocity are rounded to a step, and each node stores its difference to a neighbour with a
 lower number, modulo 2^16: smooth fields become small numbers, which LZMA compresses well. Nodes that are spent have no
 displacement of their own and get that of the nearest node that is not.
+
+The 15 committed references take 2.8 MB so. As float32 in `numpy.savez_compressed` the same rounded fields take 10.0 MB
+(2.5 to 8.5 times as much, 3.5 in all), and fields as runs write them 4 to 12 times as much.
 """
 
 from __future__ import annotations

@@ -1,14 +1,32 @@
-"""The decks that come with the program: `scene.toml` in a folder of `cases`, beside its meshes and what came out."""
+"""Files that come with the program: the committed data of the cases with their decks, and how to cite.
+
+A deck is `scene.toml` in a folder of `cases`, beside its meshes and what came out.
+"""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from ..errors import MeshError, ParameterError
+from ..errors import MeshError, OutputError, ParameterError
 
-__all__ = ["data_folder", "data_roots", "deck_name", "deck_path", "description", "shipped_decks"]
+__all__ = ["citation_file", "data_folder", "data_roots", "deck_name", "deck_path", "description", "shipped_decks"]
 
-DECK = "scene.toml"
+DECK, CITATION = "scene.toml", "CITATION.cff"
+
+
+def citation_file() -> Path:
+    """CITATION.cff of the installed package, or of a checkout.
+
+    Raises
+    ------
+    OutputError
+        It is not there.
+    """
+    package = Path(__file__).resolve().parents[1]
+    for folder in (package / "data", package.parent):
+        if (folder / CITATION).is_file():
+            return folder / CITATION
+    raise OutputError(f"{CITATION} is not installed with the program: install skfsink again")
 
 
 def data_roots() -> tuple[Path, ...]:
