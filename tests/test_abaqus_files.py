@@ -10,8 +10,8 @@ import meshio
 import numpy as np
 import pytest
 
-import skfsink.meshing.mesh_file as mesh_file
 from skfsink.errors import MeshError
+from skfsink.meshing.files import bounds
 from skfsink.meshing.mesh_file import read_mesh_file
 from skfsink.meshing.sample import Sample, file_sample
 
@@ -638,7 +638,7 @@ def test_files_that_are_not_included(name: str, part: str, tmp_path: Path) -> No
 
 def test_size_of_all_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if the bound of size is one of each file, or files may be nested without end."""
-    monkeypatch.setattr(mesh_file, "LARGEST", 2000)
+    monkeypatch.setattr(bounds, "LARGEST", 2000)
     assert "too large together" in refused(tmp_path, PLATE + "*INCLUDE, INPUT=a.inp\n" * 9, a_inp="** long\n" * 30)
     monkeypatch.undo()
     deep = {f"f{k}_inp": f"*INCLUDE, INPUT=f{k + 1}.inp\n" for k in range(20)}
@@ -689,7 +689,7 @@ def test_what_is_not_read_is_named(tmp_path: Path) -> None:
         (PLATE + "*ELEMENT, TYPE=U1\n7, 1, 2\n*USER ELEMENT, TYPE=U1, NODES=x\n", "number of NODES"),
         (PLATE + "*NGEN\n1, 9, 0\n", "*NGEN takes"),
         (PLATE + "*NGEN\n1, 99\n", "nodes that exist"),
-        (PLATE + "*ELGEN\n1, 1000000000\n", "*ELGEN"),
+        (PLATE + "*ELGEN\n1, 1000000000\n", "line 16: it asks for more than 5,000,000 nodes and elements"),
         (PLATE + "*ELGEN\n77, 2\n", "*ELGEN copies an element that exists"),
         ("*NODE\n1, 0, 0\n*ELEMENT, TYPE=MASS\n1, 1\n", "no elements of a plane or solid body, only MASS"),
         ("a heading\n" + PLATE, "no keyword file"),

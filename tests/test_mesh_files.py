@@ -5,9 +5,11 @@ from __future__ import annotations
 import functools
 import os
 import random
+import resource
 import signal
 import tempfile
 import warnings
+import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,18 +17,21 @@ from types import FrameType
 
 import meshio
 import numpy as np
+import psutil
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from plates import plate
 
 from skfsink.errors import MeshError, SkfsinkError
+from skfsink.meshing.kept_mesh import mesh_name
 from skfsink.meshing.mesh_file import check_mesh, read_mesh_file
 from skfsink.meshing.sample import Sample, file_sample, load_sample
 from skfsink.meshing.vtu import write_mesh
 
 FORMATS = ("vtu", "vtu-text", "msh2", "msh2-binary", "msh4", "msh4-binary", "inp")
 SECONDS = 10.0  # that a file may take
+ROOM = 10**9    # bytes of memory that it may take
 
 
 class Hang(BaseException):
@@ -104,11 +109,22 @@ def template(form: str) -> bytes:
         return path.read_bytes()
 
 
+@contextmanager
+def little_memory() -> Iterator[None]:
+    """Let this process take no more than 1 GB besides what it has, for as long as it reads a file."""
+    old = resource.getrlimit(resource.RLIMIT_AS)
+    resource.setrlimit(resource.RLIMIT_AS, (psutil.Process().memory_info().vms + ROOM, old[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, old)
+
+
 def outcome(path: Path) -> Sample | str:
     """The sample of a file, used as a run would begin to, or the one line that refuses it; no file is touched."""
     before = sorted(path.parent.iterdir())
     try:
-        with alarmed():
+        with alarmed(), little_memory():
             sample = file_sample(path)
             for name in sample.cells:
                 sample.elements(name)
@@ -176,7 +192,9 @@ def check_mutation(folder: Path, form: str, seed: int) -> str:
     path = folder / f"plate{suffix(form)}"
     path.write_bytes(mutated(template(form), random.Random(seed)))
     found = outcome(path)
-    return found if isinstance(found, str) else ""
+    line = found if isinstance(found, str) else ""
+    assert "more memory" not in line, line
+    return line
 
 
 FEW = settings(max_examples=150, deadline=None, database=None,
@@ -234,6 +252,7 @@ BOMB = "<!DOCTYPE a [<!ENTITY a0 '0'>" + "".join(
 OUTSIDE = "<!DOCTYPE a [<!ENTITY x SYSTEM 'file:///etc/passwd'>]>"
 MSH2 = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n"
 MSH4 = "$MeshFormat\n4.1 {} 8\n{}$EndMeshFormat\n"
+BODY = b"*NODE\n1,0,0\n2,1,0\n3,1,1\n4,0,1\n100001,9,0\n*ELEMENT,TYPE=CPE4\n1,1,2,3,4\n"
 HOSTILE: dict[str, tuple[str, bytes]] = {
     "entity bomb": ("vtu", xml("&a11;", BOMB)),
     "external entity": ("vtu", xml("&x;", OUTSIDE)),
@@ -256,6 +275,18 @@ HOSTILE: dict[str, tuple[str, bytes]] = {
     "abaqus without end": ("inp", b"*NODE\n1,0,0\n*ELSET,ELSET=a,GENERATE\n1,1000000000000,1\n"),
     "abaqus includes itself": ("inp", b"*NODE\n1,0,0\n*INCLUDE,INPUT=bad.inp\n"),
     "abaqus includes a device": ("inp", b"*Include , INPUT=/dev/zero\n"),
+    "abaqus generates nodes": ("inp", b"".join(
+        b"*NODE\n%d,0,1\n%d,1,1\n*NGEN\n%d,%d\n" % (k, k + 4_000_000, k, k + 4_000_000)
+        for k in range(10**8, 10**9, 10**7))),
+    "abaqus generates elements": ("inp", BODY + b"*ELGEN\n" + b"1,2000000,0,1\n" * 30),
+    "abaqus places a part often": ("inp", b"*PART,NAME=p\n" + BODY + b"*NGEN\n4,100001\n*END PART\n*ASSEMBLY,NAME=a\n"
+                                   + b"".join(b"*INSTANCE,NAME=i%d,PART=p\n*END INSTANCE\n" % k for k in range(900))),
+    "abaqus places many sets": ("inp", b"*PART,NAME=p\n" + BODY + b"".join(b"*NSET,NSET=s%d\n1\n" % k for k in range(
+        9000)) + b"*END PART\n*ASSEMBLY,NAME=a\n" + b"".join(
+            b"*INSTANCE,NAME=i%d,PART=p\n*END INSTANCE\n" % k for k in range(5000))),
+    "nastran holds many": ("bdf", b"GRID,1,,0.,0.,0.\n" + b"SPC1,1,12,1,THRU,9000000\n" * 50),
+    "vtk grid of a claim": ("vtk", b"# vtk DataFile Version 3.0\na\nASCII\nDATASET STRUCTURED_POINTS\n"
+                                   b"DIMENSIONS 7000 7000 1\nORIGIN 0 0 0\nSPACING 1 1 1\n"),
     "xdmf": ("xdmf", b"<Xdmf><Domain/></Xdmf>"),
 }
 
@@ -268,6 +299,7 @@ def test_hostile_files(name: str, tmp_path: Path) -> None:
     path.write_bytes(content)
     line = outcome(path)
     assert isinstance(line, str) and f"bad.{kind}" in line and "root:" not in line, line
+    assert "more memory" not in line, line
 
 
 def _compressed_bomb(path: Path) -> None:
@@ -289,7 +321,20 @@ def test_a_compressed_bomb(tmp_path: Path) -> None:
     _compressed_bomb(tmp_path / "bomb.vtu")
     assert (tmp_path / "bomb.vtu").stat().st_size < 10_000_000
     line = outcome(tmp_path / "bomb.vtu")
-    assert isinstance(line, str) and "cannot be read" in line, line
+    assert isinstance(line, str) and "unpacks to 5.37e+03 MB, the most is 500 MB" in line, line
+
+
+def test_a_bomb_of_arrays(tmp_path: Path) -> None:
+    """Fails if a small archive of arrays, as runs keep their meshes in, can fill the memory."""
+    with zipfile.ZipFile(tmp_path / "bomb.npz", "w", zipfile.ZIP_DEFLATED) as archive:
+        for name in ("head", "points", "cells"):
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as file:
+                np.lib.format.write_array_header_1_0(file, {"descr": "|u1", "fortran_order": False, "shape": (2**30,)})
+                for _ in range(2**6):
+                    file.write(bytes(2**24))
+    line = outcome(tmp_path / "bomb.npz")
+    assert isinstance(line, str) and "unpacks to 3.22e+03 MB" in line, line
+    assert mesh_name(str(tmp_path / "bomb.npz")) == "bomb"
 
 
 def _fifo(path: Path) -> None:

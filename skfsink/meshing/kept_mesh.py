@@ -16,6 +16,7 @@ import numpy as np
 from skfem.io.meshio import INV_HEX_MAPPING
 
 from ..system.files import replaced
+from .files.bounds import check_unpacked
 
 if TYPE_CHECKING:
     from .sample import Sample
@@ -57,7 +58,7 @@ def read_kept(path: Path) -> meshio.Mesh:
     ValueError, KeyError, OSError
         The file was not written by it, or is damaged.
     """
-    with np.load(path, allow_pickle=False) as stored:
+    with _opened(path) as stored:
         head = _head(stored["head"])
         points, cells = stored["points"], stored["cells"]
         kind = {4: "quad", 8: "hexahedron"}[cells.shape[1]]
@@ -66,6 +67,13 @@ def read_kept(path: Path) -> meshio.Mesh:
             point_sets={name: stored[f"boundary{i}"] for i, name in enumerate(head["boundaries"])},
             cell_sets={name: [stored[f"set{i}"]] for i, name in enumerate(head["sets"])},
             info={key: head[key] for key in ("name", "source", "made", "notes")})
+
+
+def _opened(path: str | Path) -> Any:
+    """The archive of arrays in a file; ValueError if it would unpack to more than a mesh can need."""
+    with zipfile.ZipFile(path) as archive:
+        check_unpacked(sum(entry.file_size for entry in archive.infolist()), Path(path).stat().st_size)
+    return np.load(path, allow_pickle=False)
 
 
 def _head(array: np.ndarray) -> dict[str, Any]:
@@ -79,7 +87,7 @@ def _read_head(path: str) -> dict[str, Any]:
     """What a kept mesh says of itself; empty if the file is none."""
     if path.endswith(SUFFIX):
         try:
-            with np.load(path, allow_pickle=False) as stored:
+            with _opened(path) as stored:
                 return _head(stored["head"])
         except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile):
             pass

@@ -1,4 +1,4 @@
-"""Mesh files of the user: read within bounds of size and memory, and checked before anything is computed on them.
+"""Mesh files of the user: read within bounds of size, and checked before anything is computed on them.
 
 A file is not trusted. It may claim more than it holds, name other files, or hold what is no body; each of these is a
 MeshError of one line, and nothing is written.
@@ -11,15 +11,14 @@ import io
 import os
 import stat
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import meshio
 import numpy as np
-import psutil
 
 from ..errors import MeshError, SkfsinkError
-from .files.abaqus_lines import file_size, is_keyword_file
+from .files.bounds import LARGEST
 from .files.orientation import oriented
 from .files.tidy import tidied
 from .kept_mesh import SUFFIX, read_kept
@@ -27,8 +26,6 @@ from .vtu import read_mesh
 
 __all__ = ["check_indices", "check_mesh", "one_line", "quietly", "read_mesh_file"]
 
-LARGEST = 2 * 10**9        # bytes of a mesh file
-ROOM = (10**9, 30)         # memory to read one [bytes]: at least this, or this many times its size
 POINTERS = (".xdmf", ".xmf", ".node", ".ele")  # formats that are spread over several files
 CORNERS = {"vertex": 1, "line": 2, "quad": 4, "hexahedron": 8}
 EXTENT = (1e-9, 1e9)       # mm across
@@ -80,17 +77,10 @@ def read_mesh_file(path: Path, raw: bool = False) -> meshio.Mesh:
         raise MeshError(f"there is no mesh file {shown}: what has that name is no file with content")
     if status.st_size > LARGEST:
         raise MeshError(f"{failure}: it has {status.st_size / 1e9:.1f} GB, the most is {LARGEST / 1e9:.0f} GB")
-    suffix, size = path.suffix.lower(), status.st_size
-    if suffix in POINTERS:
+    if (suffix := path.suffix.lower()) in POINTERS:
         raise MeshError(f"{failure}: it names other files; put the mesh into one file, such as VTU")
-    if suffix == ".inp" and is_keyword_file(path):
-        try:
-            size = file_size(path, LARGEST)
-        except (OSError, ValueError) as error:
-            raise MeshError(f"{failure}: {one_line(str(error))}") from None
-    with _room(max(ROOM[0], ROOM[1] * size)):
-        mesh = quietly(lambda: read_kept(path) if suffix == SUFFIX else read_mesh(path), failure)
-        quietly(lambda: _sound(mesh), failure)
+    mesh = quietly(lambda: read_kept(path) if suffix == SUFFIX else read_mesh(path), failure)
+    quietly(lambda: _sound(mesh), failure)
     check_indices(shown, mesh)
     if raw:
         return mesh
@@ -159,22 +149,3 @@ def _sound(mesh: meshio.Mesh) -> meshio.Mesh:
     for members in mesh.cell_sets.values():
         members[:] = [None if index is None else np.asarray(index, np.int64).ravel() for index in members]
     return mesh
-
-
-@contextlib.contextmanager
-def _room(size: int) -> Iterator[None]:
-    """Let this process take no more than `size` bytes besides what it has, where the system can see to it."""
-    try:
-        import resource
-
-        old = resource.getrlimit(resource.RLIMIT_AS)
-        most = psutil.Process().memory_info().vms + size
-        if old[0] == resource.RLIM_INFINITY or most < old[0]:
-            resource.setrlimit(resource.RLIMIT_AS, (most, old[1]))
-    except (ImportError, OSError, ValueError, psutil.Error):
-        yield
-        return
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_AS, old)

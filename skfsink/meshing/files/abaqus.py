@@ -18,6 +18,7 @@ from .abaqus_lines import Block, is_keyword_file, listed, read_blocks
 from .abaqus_parts import Named, Part, User
 from .abaqus_places import turned
 from .abaqus_sets import Body, Placed
+from .bounds import Copies
 from .unreadable import Unreadable
 
 __all__ = ["is_keyword_file", "read_abaqus"]
@@ -63,7 +64,8 @@ class Model:
         self.users = _users(blocks)
         if any("written by meshio" in line for block in blocks[:1] for line in block.data[:3]):
             self._by_meshio(blocks)
-        self.root = Part("", self.users)
+        self.copies = Copies()
+        self.root = Part("", self.users, self.copies)
         self.parts: dict[str, Part] = {}
         self.instances: dict[str, tuple[str, Part, Part, Block]] = {}
         self._noted: dict[str, list[Block]] = {}
@@ -92,7 +94,7 @@ class Model:
                 name = block.need("NAME")
                 if name.lower() in self.parts:
                     raise block.error(f"part {name[:60]!r} is given twice")
-                now = part = self.parts[name.lower()] = Part(name, self.users)
+                now = part = self.parts[name.lower()] = Part(name, self.users, self.copies)
             elif keyword in ("ENDPART", "ASSEMBLY", "ENDASSEMBLY", "STEP"):
                 now = part = self.root
             elif keyword == "INSTANCE":
@@ -136,9 +138,10 @@ class Model:
             raise block.error(f"instance {name[:60]!r} is given twice")
         if (part := self.parts.get(of.lower())) is None:
             raise block.error(f"there is no part {of[:60]!r}")
-        own = Part(part.name, self.users)
+        own = Part(part.name, self.users, self.copies)
         own.nodes, own.elements = [*part.nodes], [*part.elements]
         for kind in ("node_sets", "element_sets", "surfaces"):
+            self.copies.add(0, sum(1 + len(named.entries) for named in getattr(part, kind).values()), block.error)
             setattr(own, kind, {key: Named(named.name, [*named.entries], named.kind)
                                 for key, named in getattr(part, kind).items()})
         self.instances[name.lower()] = (name, part, own, block)
@@ -154,8 +157,13 @@ class Model:
             self.body.place(part.name, part, *part.all_nodes())
             self.instances[part.name.lower()] = (part.name, part, part, Block("PART", {}, "", 1, 1))
         else:
-            for name, _, own, block in self.instances.values():
+            placed = set()
+            for name, part, own, block in self.instances.values():
                 numbers, points = own.all_nodes()
+                if part.name in placed:
+                    self.copies.add(len(numbers) + sum(len(elements.numbers) for elements in own.elements),
+                                    error=block.error)
+                placed.add(part.name)
                 self.body.place(name, own, numbers, turned(points, block))
         self.body.place("", self.root, *self.root.all_nodes())
         used = {part.name for _, part, _, _ in self.instances.values()}

@@ -12,12 +12,12 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from . import bounds
 from .unreadable import Unreadable
 
-__all__ = ["Block", "file_size", "is_keyword_file", "listed", "read_blocks", "words"]
+__all__ = ["Block", "is_keyword_file", "listed", "read_blocks", "words"]
 
-LARGEST = 2 * 10**9  # bytes of all files together
-DEEPEST = 8          # files within files
+DEEPEST = 8  # files within files
 MARKS = ((b"\xef\xbb\xbf", "utf-8-sig"), (b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16"))
 #: keywords that are read, which may be cut short, and their parameters, which may as well
 PARAMETERS = {"NODE": ("NSET", "INPUT", "SYSTEM"), "ELEMENT": ("TYPE", "ELSET", "INPUT", "FILE", "OFFSET"),
@@ -112,42 +112,24 @@ def is_keyword_file(path: Path) -> bool:
     return _decoded(begin).lstrip("\ufeff \t\r\n\f").startswith("*")
 
 
-def file_size(path: Path, largest: int = LARGEST) -> int:
-    """Bytes of a keyword file and of those that it includes, at most all together `largest`.
+def read_blocks(path: Path) -> list[Block]:
+    """Keywords and data lines of a keyword file and of those that it includes, in order.
 
     Raises
     ------
     Unreadable
         A file that is included is not there, not in the folder of `path`, includes itself, or all are too large.
     """
-    return _size(path, path.parent.resolve(), (path.resolve(),), largest)
-
-
-def _size(path: Path, folder: Path, above: tuple[Path, ...], left: int) -> int:
-    size = path.stat().st_size
-    if size > left:
-        raise Unreadable("it and the files that it includes are too large together; leave out results and the like")
-    raw = path.read_bytes()
-    if b"\0" in raw[:100] or re.search(rb"input[ \t]*=", raw, re.IGNORECASE):
-        lines = _lines(raw)
-        del raw
-        for at, line in enumerate(lines):
-            if line.lstrip()[:1] == "*" and line.lstrip()[:2] != "**":
-                keyword, parameters, _ = _header(lines, at)
-                if keyword in FILES and (name := parameters.get("INPUT")):
-                    found = _found(name, folder, above, _where(_shown(path, folder, above), at + 1))
-                    size += _size(found, folder, (*above, found), left - size)
-    return size
-
-
-def read_blocks(path: Path) -> list[Block]:
-    """Keywords and data lines of a keyword file and of those that it includes, in order; see :func:`file_size`."""
     blocks: list[Block] = []
-    _read(path, path.parent.resolve(), (path.resolve(),), blocks)
+    _read(path, path.parent.resolve(), (path.resolve(),), blocks, bounds.LARGEST)
     return blocks
 
 
-def _read(path: Path, folder: Path, above: tuple[Path, ...], blocks: list[Block]) -> None:
+def _read(path: Path, folder: Path, above: tuple[Path, ...], blocks: list[Block], most: int) -> int:
+    """Append the blocks of a file and of those that it includes; their bytes, of which there are at most `most`."""
+    size = path.stat().st_size
+    if size > most:
+        raise Unreadable("it and the files that it includes are too large together; leave out results and the like")
     shown = _shown(path, folder, above)
     lines = _lines(path.read_bytes())
     stars = [i for i, line in enumerate(lines) if line[:1] in "* \t" and line.lstrip()[:1] == "*"
@@ -164,8 +146,9 @@ def _read(path: Path, folder: Path, above: tuple[Path, ...], blocks: list[Block]
             raise Unreadable(f"{_where(shown, at + 1)}: *INCLUDE needs INPUT=")
         if name:
             found = _found(name, folder, above, _where(shown, at + 1))
-            _read(found, folder, (*above, found), blocks)
+            size += _read(found, folder, (*above, found), blocks, most - size)
             _go_on(blocks, lines, first, end, shown)
+    return size
 
 
 def _go_on(blocks: list[Block], lines: list[str], first: int, end: int, shown: str) -> None:

@@ -10,6 +10,7 @@ from .abaqus_lines import Block
 from .abaqus_numbers import Numbers, number
 from .abaqus_places import System
 from .abaqus_types import AXISYMMETRIC, ORDER, REFUSED, SIZE, cell_of
+from .bounds import Copies
 from .unreadable import Unreadable
 
 __all__ = ["Elements", "Entry", "Named", "Part", "User"]
@@ -74,8 +75,8 @@ class Part:
     node_sets, element_sets, surfaces: by name in small letters.
     """
 
-    def __init__(self, name: str, users: dict[str, User]) -> None:
-        self.name, self.users = name, users
+    def __init__(self, name: str, users: dict[str, User], copies: Copies) -> None:
+        self.name, self.users, self.copies = name, users, copies
         self.nodes: list[tuple[np.ndarray, np.ndarray]] = []
         self.elements: list[Elements] = []
         self.node_sets: dict[str, Named] = {}
@@ -135,14 +136,17 @@ class Part:
         if block.parameters.get("LINE"):
             raise block.error("*NGEN on curves is not read: write the nodes themselves")
         numbers, points = self.all_nodes()
-        at = dict(zip(numbers.tolist(), range(len(numbers))))
+        order = np.argsort(numbers)
+        ordered = numbers[order]
         for i, row in Numbers(block, whole=True).rows():
             first, last, step = int(row[0]), int(row[1]) if len(row) > 1 else 0, int(row[2]) if len(row) > 2 else 1
-            if first not in at or last not in at:
+            at = np.minimum(np.searchsorted(ordered, (first, last)), len(ordered) - 1)
+            if not len(ordered) or (ordered[at] != (first, last)).any():
                 raise block.error(f"*NGEN is between nodes that exist; got {first} and {last}", i)
-            if step == 0 or (last - first) % step or (n := (last - first) // step) < 1 or n > 10**7 or len(row) > 3:
+            if step == 0 or (last - first) % step or (n := (last - first) // step) < 1 or len(row) > 3:
                 raise block.error(f"*NGEN takes first, last and step, a part of their difference; got {row}", i)
-            ends, share = points[[at[first], at[last]]], np.arange(n + 1) / n
+            self.copies.add(n, error=block.error)
+            ends, share = points[order[at]], np.arange(n + 1) / n
             if name := block.parameters.get("NSET"):
                 _named(self.node_sets, name).entries.append(Entry(np.array([first, last]), block))
             between = ends[0] + share[1:-1, None] * (ends[1] - ends[0])
@@ -239,8 +243,9 @@ class Part:
                 raise block.error("*ELGEN takes up to 10 numbers", i)
             for k in range(0, len(steps), 3):
                 n, by_node, by_element = (*steps[k:k + 3], *(1, 1, 1)[len(steps[k:k + 3]):])
-                if n < 1 or n * len(numbers) > 10**7:
+                if n < 1:
                     raise block.error(f"*ELGEN of {n} copies", i)
+                self.copies.add(n * len(numbers), error=block.error)
                 copies = np.arange(n)
                 numbers = (numbers + by_element * copies[:, None]).ravel()
                 nodes = (nodes + by_node * copies[:, None, None]).reshape(len(numbers), -1)

@@ -49,7 +49,7 @@ def read_nastran(path: Path) -> meshio.Mesh:
     """
     points: dict[int, list[float]] = {}
     cells: dict[str, list[tuple[list[int], int]]] = {}
-    held: dict[str, list[int]] = {}
+    held: dict[str, tuple[set[int], list[range]]] = {}  # single grid points, and ranges of them
     left_out: Counter[str] = Counter()
     for number, card, fields in _cards(path.read_bytes().decode(errors="replace").splitlines()):
         try:
@@ -65,8 +65,7 @@ def read_nastran(path: Path) -> meshio.Mesh:
                 name, nodes, group = _element(card, fields)
                 cells.setdefault(name, []).append((nodes, group))
             elif card in ("SPC", "SPC1"):
-                for node in _held(card, fields):
-                    held.setdefault(f"spc:{int(fields[0])}", []).append(node)
+                _hold(card, fields, *held.setdefault(f"spc:{int(fields[0])}", (set(), [])))
             elif card.startswith("INCLUDE"):
                 raise Unreadable(f"line {number}: it names another file; put all into one")
             elif card.startswith(ROUND):
@@ -83,7 +82,8 @@ def read_nastran(path: Path) -> meshio.Mesh:
         raise Unreadable("it has no grid points")
     tags = np.array(list(points), np.int64)
     notes = [f"{n} card(s) {card} were left out" for card, n in sorted(left_out.items())]
-    there = {name: np.array([node for node in nodes if node in points], np.int64) for name, nodes in held.items()}
+    there = {name: np.array([node for node in points if node in single or any(node in own for own in ranges)], np.int64)
+             for name, (single, ranges) in held.items()}
     return meshio.Mesh(np.array(list(points.values())),
                        [(name, places(tags, np.array([nodes for nodes, _ in rows], np.int64))
                          [:, ORDER.get(name, slice(None))]) for name, rows in cells.items()],
@@ -107,17 +107,13 @@ def _element(card: str, fields: list[str]) -> tuple[str, list[int], int]:
     return name, nodes[:n], group
 
 
-def _held(card: str, fields: list[str]) -> list[int]:
-    """Grid points of a constraint."""
-    if card == "SPC":
-        return [int(x) for x in (fields[1], *fields[4:5]) if x]
-    words = [x for x in fields[2:] if x]
-    if len(words) == 3 and words[1].upper() == "THRU":
-        first, last = int(words[0]), int(words[2])
-        if last - first > 10**7:
-            raise ValueError
-        return [*range(first, last + 1)]
-    return [int(x) for x in words]
+def _hold(card: str, fields: list[str], single: set[int], ranges: list[range]) -> None:
+    """Add the grid points of a constraint, some of which may not exist."""
+    words = [x for x in ((fields[1], *fields[4:5]) if card == "SPC" else fields[2:]) if x]
+    if card != "SPC" and len(words) == 3 and words[1].upper() == "THRU":
+        ranges.append(range(int(words[0]), int(words[2]) + 1))
+    else:
+        single.update(map(int, words))
 
 
 def _real(field: str) -> float:

@@ -15,6 +15,7 @@ from urllib.parse import unquote
 import meshio
 import numpy as np
 
+from .bounds import MOST
 from .numbers import Text
 from .unreadable import Unreadable
 from .vtk_cells import vtk_mesh
@@ -26,7 +27,6 @@ TYPES = {"unsigned_char": "u1", "char": "i1", "signed_char": "i1", "unsigned_sho
          "double": "f8", "unsigned_long_long": "u8", "long_long": "i8",
          **{f"vtktype{sign}int{8 * size}": f"{sign or 'i'}{size}" for sign in ("", "u") for size in (1, 2, 4, 8)}}
 COMPONENTS = {"VECTORS": 3, "NORMALS": 3, "TENSORS": 9, "TENSORS6": 6, "GLOBAL_IDS": 1, "PEDIGREE_IDS": 1}
-MOST = 5 * 10**7  # points of a grid that is given by its dimensions
 NEXT = re.compile(rb"^[ \t]*(?!nan|inf)[A-Za-z_]", re.M | re.I)  # a line that begins with a word
 
 

@@ -19,6 +19,7 @@ from xml.etree import ElementTree as ET
 import meshio
 import numpy as np
 
+from .bounds import check_unpacked
 from .lz4 import lz4_block
 from .numbers import Text
 from .unreadable import Unreadable
@@ -59,7 +60,7 @@ def read_vtu(path: Path) -> meshio.Mesh:
         raise Unreadable(f"it holds {root.get('type') or 'something else'} and not UnstructuredGrid; "
                          "in ParaView apply Append Datasets and save it as VTU")
     raw = found is not None and root.find("AppendedData").get("encoding", "base64") == "raw"  # type: ignore[union-attr]
-    return _mesh(root, _Arrays(root, appended if raw else b"".join(appended.split()), raw))
+    return _mesh(root, _Arrays(root, appended if raw else b"".join(appended.split()), raw, len(data)))
 
 
 def _mesh(root: ET.Element, arrays: _Arrays) -> meshio.Mesh:
@@ -92,10 +93,13 @@ def _mesh(root: ET.Element, arrays: _Arrays) -> meshio.Mesh:
 
 
 class _Arrays:
-    """Values of the elements DataArray of a file."""
+    """Values of the elements DataArray of a file of `size` bytes.
 
-    def __init__(self, root: ET.Element, appended: bytes, raw: bool) -> None:
-        self.appended, self.raw = appended, raw
+    Memory: `read` counts the bytes of compressed arrays, which all together have a bound.
+    """
+
+    def __init__(self, root: ET.Element, appended: bytes, raw: bool, size: int) -> None:
+        self.appended, self.raw, self.size, self.unpacked = appended, raw, size, 0
         self.order = ">" if root.get("byte_order") == "BigEndian" else "<"
         self.head = np.dtype(self.order + ("u8" if root.get("header_type") == "UInt64" else "u4"))
         compressor = root.get("compressor", "")
@@ -161,6 +165,8 @@ class _Arrays:
         total = int(packed.sum())
         if total > len(source) or (packed < 0).any() or whole < 0 or last < 0:
             raise short
+        self.unpacked += whole * max(count - 1, 0) + (last or whole)
+        check_unpacked(self.unpacked, self.size)
         content = bytes(source[begin:begin + total]) if raw else _decoded(source[begin:], total)
         if len(content) < total:
             raise short
