@@ -1,8 +1,9 @@
-"""Memory that a run will need, estimated from its mesh before anything is computed; more than there is, is refused."""
+"""Memory of a run: what it will need, estimated from its mesh before anything is computed, and what it has needed."""
 
 from __future__ import annotations
 
 import os
+import sys
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,12 @@ from ..fem.space import Space
 from ..scene.scene import Scene
 from .display import Display
 
-__all__ = ["LIMIT", "available", "check_memory", "estimate", "factor_entries"]
+try:
+    import resource
+except ImportError:  # Windows, and systems without processes
+    resource = None  # type: ignore[assignment]
+
+__all__ = ["LIMIT", "available", "check_memory", "estimate", "factor_entries", "peak_rss_mb"]
 
 LIMIT = "SKFSINK_MEMORY_GB"  #: environment variable: memory that a run may use [GB], instead of what is found
 LEAF = 60           # elements that dissection does not divide further
@@ -45,6 +51,15 @@ def available() -> float:
             with suppress(OSError, ValueError):  # no such file, or no limit: "max"
                 free.append(max(int((folder / limit).read_text()) - int((folder / usage).read_text()), 0))
     return float(min(free) + psutil.Process().memory_info().rss) / 1e9
+
+
+def peak_rss_mb() -> float:
+    """Greatest memory this process has used [MB]; what it uses now, where the system does not keep that."""
+    if resource is None:
+        memory = psutil.Process().memory_info()
+        return float(getattr(memory, "peak_wset", memory.rss)) / 1e6
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak / 1e6 if sys.platform == "darwin" else peak / 1e3
 
 
 def check_memory(scene: Scene, display: Display) -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import resource
-import sys
 from typing import Any
 
 import numpy as np
@@ -12,20 +10,15 @@ from ..results.history import history_units, load_name
 from ..results.summary import versions
 from ..scene.scene import Scene
 from .material_point import beside_theory
+from .memory import peak_rss_mb
 from .observers.places import greatest_ratio
 from .quantities import measured
 from .simulate import Simulation
 from .verdict import verdict
 
-__all__ = ["SCHEMA", "peak_rss_mb", "summarize"]
+__all__ = ["SCHEMA", "summarize"]
 
 SCHEMA = 3   # 2 counted "sweeps"; 1 had "reaction_N_per_mm" for forces [N] on bodies in space, and no "units"
-
-
-def peak_rss_mb() -> float:
-    """Greatest memory this process has used [MB]."""
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return peak / 1e6 if sys.platform == "darwin" else peak / 1e3
 
 
 def summarize(scene: Scene, simulation: Simulation) -> dict[str, Any]:
