@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import os
 import random
-import resource
 import signal
 import tempfile
 import warnings
@@ -111,7 +110,15 @@ def template(form: str) -> bytes:
 
 @contextmanager
 def little_memory() -> Iterator[None]:
-    """Let this process take no more than 1 GB besides what it has, for as long as it reads a file."""
+    """Let this process take no more than 1 GB besides what it has, for as long as it reads a file.
+
+    Where the system can see to that.
+    """
+    try:
+        import resource
+    except ImportError:
+        yield
+        return
     old = resource.getrlimit(resource.RLIMIT_AS)
     resource.setrlimit(resource.RLIMIT_AS, (psutil.Process().memory_info().vms + ROOM, old[1]))
     try:

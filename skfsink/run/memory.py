@@ -104,15 +104,15 @@ def factor_entries(space: Space, elements: np.ndarray | None = None, done: np.nd
     nodes = np.unique(conn)
     around = int(done[nodes].sum())
     if len(elements) <= LEAF:
-        own = len(nodes) - around
-        return own * (own / 2 + around)
+        inner = len(nodes) - around
+        return inner * (inner / 2 + around)
     middle = space.X[conn].mean(axis=1)
     order = np.argsort(middle[:, np.ptp(middle, axis=0).argmax()], kind="stable")
     halves = elements[order[:len(order) // 2]], elements[order[len(order) // 2:]]
     shared = np.intersect1d(space.conn[halves[0]], space.conn[halves[1]])
     shared = shared[~done[shared]]
-    own = len(shared)
+    inner = len(shared)
     done[shared] = True
     below = sum(factor_entries(space, half, done) for half in halves)
     done[shared] = False
-    return below + own * (own / 2 + around)
+    return below + inner * (inner / 2 + around)

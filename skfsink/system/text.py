@@ -65,9 +65,9 @@ def read_toml(path: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        said = str(error).splitlines()[0]
-        at = re.search(r"at line (\d+)", said)
+        message = str(error).splitlines()[0]
+        at = re.search(r"at line (\d+)", message)
         lines = text.split("\n")
         line = lines[min(int(at[1]), len(lines)) - 1] if at else ""
         cure = next((f": {cure}" for pattern, cure in CURES if pattern.search(line)), "")
-        raise ValueError(said + cure) from None
+        raise ValueError(message + cure) from None

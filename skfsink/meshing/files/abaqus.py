@@ -15,7 +15,8 @@ import meshio
 
 from .abaqus_cells import Cells
 from .abaqus_lines import Block, is_keyword_file, listed, read_blocks
-from .abaqus_parts import Named, Part, User
+from .abaqus_named import Named
+from .abaqus_parts import Part, User
 from .abaqus_places import turned
 from .abaqus_sets import Body, Placed
 from .bounds import Copies
@@ -138,14 +139,14 @@ class Model:
             raise block.error(f"instance {name[:60]!r} is given twice")
         if (part := self.parts.get(of.lower())) is None:
             raise block.error(f"there is no part {of[:60]!r}")
-        own = Part(part.name, self.users, self.copies)
-        own.nodes, own.elements = [*part.nodes], [*part.elements]
+        instance = Part(part.name, self.users, self.copies)
+        instance.nodes, instance.elements = [*part.nodes], [*part.elements]
         for kind in ("node_sets", "element_sets", "surfaces"):
             self.copies.add(0, sum(1 + len(named.entries) for named in getattr(part, kind).values()), block.error)
-            setattr(own, kind, {key: Named(named.name, [*named.entries], named.kind)
+            setattr(instance, kind, {key: Named(named.name, [*named.entries], named.kind)
                                 for key, named in getattr(part, kind).items()})
-        self.instances[name.lower()] = (name, part, own, block)
-        return own
+        self.instances[name.lower()] = (name, part, instance, block)
+        return instance
 
     def _place(self) -> None:
         if not self.instances and self.parts:
@@ -157,14 +158,14 @@ class Model:
             self.body.place(part.name, part, *part.all_nodes())
             self.instances[part.name.lower()] = (part.name, part, part, Block("PART", {}, "", 1, 1))
         else:
-            placed = set()
-            for name, part, own, block in self.instances.values():
-                numbers, points = own.all_nodes()
-                if part.name in placed:
-                    self.copies.add(len(numbers) + sum(len(elements.numbers) for elements in own.elements),
+            seen = set()
+            for name, part, instance, block in self.instances.values():
+                numbers, points = instance.all_nodes()
+                if part.name in seen:
+                    self.copies.add(len(numbers) + sum(len(elements.numbers) for elements in instance.elements),
                                     error=block.error)
-                placed.add(part.name)
-                self.body.place(name, own, numbers, turned(points, block))
+                seen.add(part.name)
+                self.body.place(name, instance, numbers, turned(points, block))
         self.body.place("", self.root, *self.root.all_nodes())
         used = {part.name for _, part, _, _ in self.instances.values()}
         if left := [part.name for part in self.parts.values() if part.name not in used]:
@@ -184,10 +185,10 @@ class Model:
             for low, named in getattr(placed.part, kind).items():
                 found.append((f"{placed.name}.{named.name}", [(placed, named)]))
                 inner.setdefault(low, []).append((placed, named))
-        own, what = {name.lower() for name, _ in found}, kind.replace("_", " ")[:-1]
+        used, what = {name.lower() for name, _ in found}, kind.replace("_", " ")[:-1]
         for low, sets in inner.items():
             name = sets[0][1].name
-            if low in own:
+            if low in used:
                 continue
             if len(parts := list(dict.fromkeys(placed.part.name for placed, _ in sets))) > 1:
                 self.notes.append(f"the {what} {name[:60]!r} is in the parts {listed(parts)}: it is called "
@@ -205,8 +206,8 @@ def _users(blocks: list[Block]) -> dict[str, User]:
     users = {}
     for block in blocks:
         if block.keyword == "USERELEMENT":
-            given = [block.need("NODES"), block.parameters.get("COORDINATES", "0")]
-            if not all(word.isascii() and word.isdecimal() and len(word) < 4 for word in given) or given[0] == "0":
-                raise block.error(f"a user element has a number of NODES and COORDINATES; got {listed(given)}")
-            users[block.need("TYPE").upper()] = User(int(given[0]), int(given[1]))
+            counts = [block.need("NODES"), block.parameters.get("COORDINATES", "0")]
+            if not all(word.isascii() and word.isdecimal() and len(word) < 4 for word in counts) or counts[0] == "0":
+                raise block.error(f"a user element has a number of NODES and COORDINATES; got {listed(counts)}")
+            users[block.need("TYPE").upper()] = User(int(counts[0]), int(counts[1]))
     return users

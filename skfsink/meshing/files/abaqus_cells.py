@@ -6,7 +6,8 @@ import meshio
 import numpy as np
 
 from .abaqus_lines import listed
-from .abaqus_parts import Elements, Named
+from .abaqus_named import Named
+from .abaqus_parts import Elements
 from .abaqus_sets import Body, Placed, base_of
 from .abaqus_types import PLANE_STRESS, SHELL
 from .unreadable import Unreadable
@@ -35,7 +36,7 @@ class Cells:
         self.block, self.row = np.full(body.n_elements, -1), np.zeros(body.n_elements, np.int64)
         self.cells: list[tuple[str, np.ndarray]] = []
         self._users()
-        self.solid = any(base_of(own.cell) in SOLID for own, _, nodes in body.blocks if len(nodes))
+        self.solid = any(base_of(group.cell) in SOLID for group, _, nodes in body.blocks if len(nodes))
         self._body()
         self._facets()
         self._notes()
@@ -45,38 +46,39 @@ class Cells:
         body = self.body
         self.same: list[tuple[np.ndarray, np.ndarray]] = []
         known: dict[int, tuple[np.ndarray, np.ndarray]] = {}  # rows of nodes, ascending, and their elements
-        users = [k for k, (own, _, nodes) in enumerate(body.blocks) if own.user is not None and len(nodes)]
+        users = [k for k, (group, _, nodes) in enumerate(body.blocks) if group.user is not None and len(nodes)]
         if not users:
             return
-        others = [(at, nodes) for own, at, nodes in body.blocks if own.user is None and own.cell not in ("", "line")]
+        others = [(at, nodes) for group, at, nodes in body.blocks
+                  if group.user is None and group.cell not in ("", "line")]
         for size in {body.blocks[k][2].shape[1] for k in users}:
             known[size] = _joined([(np.sort(nodes, axis=1), at + np.arange(len(nodes))) for at, nodes in others
                                    if nodes.shape[1] == size], size)
         twins: dict[tuple[str, str], list[int]] = {}
         for k in users:
-            own, at, nodes = body.blocks[k]
+            group, at, nodes = body.blocks[k]
             size = nodes.shape[1]
             rows, elements = np.sort(nodes, axis=1), at + np.arange(len(nodes))
             found = _match(rows, *known[size])
             single = found < 0
             if not single.all():
                 self.same.append((elements[~single], found[~single]))
-                entry = twins.setdefault((own.kind, own.block.where), [0, 0])
+                entry = twins.setdefault((group.kind, group.block.where), [0, 0])
                 entry[0] += int(np.count_nonzero(~single))
             if not single.any():
                 continue
-            assert own.user is not None
+            assert group.user is not None
             flat = size in (3, 4) and not np.ptp(body.points[nodes[single]][..., 2])
-            dim = 2 if flat else own.user.coordinates or 3
+            dim = 2 if flat else group.user.coordinates or 3
             if (cell := USER_CELLS.get((dim, size), "")) == "":
-                raise own.block.error(f"{np.count_nonzero(single)} user elements {own.kind} of {size} nodes have no "
-                                      "element of Abaqus on the same nodes, and may be of any form: add a layer of "
+                raise group.block.error(f"{np.count_nonzero(single)} user elements {group.kind} of {size} nodes have "
+                                      "no element of Abaqus on the same nodes, and may be of any form: add a layer of "
                                       "such elements (CPE4, C3D8)")
-            self.notes.append(f"{np.count_nonzero(single)} user elements {own.kind} ({own.block.where}) are taken as "
-                              f"{'quadrilaterals' if cell == 'quad' else cell + 's'}, by their {size} nodes in {dim} "
-                              "dimensions")
-            own = Elements(own.kind, cell, own.numbers, own.nodes, own.block, own.user)
-            body.blocks[k] = (own, at, nodes)
+            self.notes.append(f"{np.count_nonzero(single)} user elements {group.kind} ({group.block.where}) are taken "
+                              f"as {'quadrilaterals' if cell == 'quad' else cell + 's'}, by their {size} nodes in "
+                              f"{dim} dimensions")
+            group = Elements(group.kind, cell, group.numbers, group.nodes, group.block, group.user)
+            body.blocks[k] = (group, at, nodes)
             known[size] = _joined([known[size], (rows[single], elements[single])], size)
         for (kind, where), (count, _) in twins.items():
             self.notes.append(f"{count} user elements {kind} ({where}) have the nodes of other elements and count once "
@@ -88,23 +90,23 @@ class Cells:
         for elements, _ in self.same:
             double[elements] = True
         found: dict[str, list[np.ndarray]] = {}
-        for own, at, nodes in self.body.blocks:
-            if not own.cell or own.cell == "line" or (base_of(own.cell) in SOLID) != self.solid or not len(nodes):
+        for group, at, nodes in self.body.blocks:
+            if not group.cell or group.cell == "line" or (base_of(group.cell) in SOLID) != self.solid or not len(nodes):
                 continue
             keep = np.flatnonzero(~double[at:at + len(nodes)])
-            if own.cell not in found:
-                found[own.cell] = []
-                self.cells.append((own.cell, nodes[:0]))
-            number = [cell for cell, _ in self.cells].index(own.cell)
+            if group.cell not in found:
+                found[group.cell] = []
+                self.cells.append((group.cell, nodes[:0]))
+            number = [cell for cell, _ in self.cells].index(group.cell)
             self.block[at + keep] = number
-            self.row[at + keep] = sum(map(len, found[own.cell])) + np.arange(len(keep))
-            found[own.cell].append(nodes[keep])
+            self.row[at + keep] = sum(map(len, found[group.cell])) + np.arange(len(keep))
+            found[group.cell].append(nodes[keep])
         self.cells = [(cell, np.concatenate(found[cell])) for cell, _ in self.cells]
         self.n_body = len(self.cells)
         for elements, others in self.same:
             self.block[elements], self.row[elements] = self.block[others], self.row[others]
         if not self.cells:
-            kinds = listed(dict.fromkeys(own.kind for own, _, _ in self.body.blocks))
+            kinds = listed(dict.fromkeys(group.kind for group, _, _ in self.body.blocks))
             raise Unreadable(f"it has no elements of a plane or solid body, only {kinds}")
 
     def _facets(self) -> None:
@@ -114,24 +116,24 @@ class Cells:
             used[nodes] = True
         self.left: dict[str, list[tuple[int, str]]] = {}
         self.facets: dict[str, list[np.ndarray]] = {}
-        for own, at, nodes in self.body.blocks:
-            body = own.cell not in ("", "line") and (base_of(own.cell) in SOLID) == self.solid
-            if body or not len(nodes) or own.user is not None:
+        for group, at, nodes in self.body.blocks:
+            body = group.cell not in ("", "line") and (base_of(group.cell) in SOLID) == self.solid
+            if body or not len(nodes) or group.user is not None:
                 continue
-            where = (len(nodes), own.block.where)
-            ends = _ends(self.body.points, nodes) if own.cell == "line" else None
-            if own.cell == "line" and not self.solid and ends is not None and used[ends].all():
+            where = (len(nodes), group.block.where)
+            ends = _ends(self.body.points, nodes) if group.cell == "line" else None
+            if group.cell == "line" and not self.solid and ends is not None and used[ends].all():
                 self._add(ends, at)
-                self.left.setdefault(f"edge {own.kind}", []).append(where)
-            elif self.solid and base_of(own.cell) in ("quad", "triangle"):
-                corners = nodes[:, :4 if base_of(own.cell) == "quad" else 3]
+                self.left.setdefault(f"edge {group.kind}", []).append(where)
+            elif self.solid and base_of(group.cell) in ("quad", "triangle"):
+                corners = nodes[:, :4 if base_of(group.cell) == "quad" else 3]
                 if not used[corners].all():
-                    raise own.block.error(f"elements {own.kind} lie beside the solid body: a mesh is either plane or "
-                                          "solid; leave the others out")
+                    raise group.block.error(f"elements {group.kind} lie beside the solid body: a mesh is either plane "
+                                            "or solid; leave the others out")
                 self._add(corners, at)
-                self.left.setdefault(f"face {own.kind}", []).append(where)
+                self.left.setdefault(f"face {group.kind}", []).append(where)
             else:
-                self.left.setdefault(f" {own.kind}", []).append(where)
+                self.left.setdefault(f" {group.kind}", []).append(where)
 
     def _add(self, corners: np.ndarray, at: int | None = None) -> tuple[int, np.ndarray]:
         """Put cells among the edges or faces; gives their block and their rows."""
@@ -157,7 +159,7 @@ class Cells:
             else:
                 shown = "are no body and are left out"
             self.notes.append(f"{count} element(s) of type {kind} ({where}) {shown}")
-        kinds = {own.kind: own.block.where for own, _, nodes in self.body.blocks if len(nodes) and not self.solid}
+        kinds = {group.kind: group.block.where for group, _, nodes in self.body.blocks if len(nodes) and not self.solid}
         if stress := [kind for kind in kinds if PLANE_STRESS.match(kind)]:
             self.notes.append(f"the elements are of plane stress ({listed(stress)}): a deck decides, with "
                               'element = "planestress"')
@@ -200,14 +202,14 @@ class Cells:
             self._collect(at, named, surfaces, corners, nodes, ())
         if not corners and not nodes:
             return
-        own = np.unique(np.concatenate([c.ravel() for c in (*corners, *nodes)]))
+        nodes_of_set = np.unique(np.concatenate([c.ravel() for c in (*corners, *nodes)]))
         taken = next((key for key in points if key.lower() == name.lower()), None)
-        if taken is not None and not np.array_equal(points[taken], own):
+        if taken is not None and not np.array_equal(points[taken], nodes_of_set):
             self.notes.append(f"the node set and the surface {name[:60]!r} are of other nodes: the surface is called "
                               f"'surface:{name[:60]}'")
             name = f"surface:{name}"
         if nodes:
-            points[name] = own
+            points[name] = nodes_of_set
             return
         members = sets.setdefault(name, {})
         for faces in corners:

@@ -1,19 +1,20 @@
-"""Parts of Abaqus models: nodes, elements and sets as the data lines give them, by their numbers in the part."""
+"""Parts of Abaqus models: nodes and elements as the data lines give them, by their numbers in the part."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
 from .abaqus_lines import Block
+from .abaqus_named import Entry, Named, named, read_set, read_surface
 from .abaqus_numbers import Numbers, number
 from .abaqus_places import System
 from .abaqus_types import AXISYMMETRIC, ORDER, REFUSED, SIZE, cell_of
 from .bounds import Copies
 from .unreadable import Unreadable
 
-__all__ = ["Elements", "Entry", "Named", "Part", "User"]
+__all__ = ["Elements", "Part", "User"]
 
 
 @dataclass(frozen=True)
@@ -34,31 +35,6 @@ class Elements:
     nodes: np.ndarray
     block: Block
     user: User | None = None
-
-
-@dataclass(frozen=True)
-class Entry:
-    """Members of a set: numbers, a range (first, last, step), or the name of a set.
-
-    `instance` is the one they are of, `face` the face of elements in a surface, and `other` whether nodes are those of
-    a set of elements.
-    """
-
-    members: np.ndarray | tuple[int, int, int] | str
-    block: Block
-    line: int | None = None
-    instance: str = ""
-    face: str = ""
-    other: bool = False
-
-
-@dataclass
-class Named:
-    """A set or surface: its name as first written, and what is put into it; `kind` is the TYPE of a surface."""
-
-    name: str
-    entries: list[Entry] = field(default_factory=list)
-    kind: str = ""
 
 
 class Part:
@@ -103,7 +79,7 @@ class Part:
         """Nodes by number, into the set that the keyword names as well."""
         self.nodes.append((numbers, points))
         if name := block.parameters.get("NSET"):
-            _named(self.node_sets, name).entries.append(Entry(numbers, block))
+            named(self.node_sets, name).entries.append(Entry(numbers, block))
 
     def all_nodes(self) -> tuple[np.ndarray, np.ndarray]:
         """Numbers and coordinates of all nodes (a node that is given again at the same place counts once).
@@ -148,7 +124,7 @@ class Part:
             self.copies.add(n, error=block.error)
             ends, share = points[order[at]], np.arange(n + 1) / n
             if name := block.parameters.get("NSET"):
-                _named(self.node_sets, name).entries.append(Entry(np.array([first, last]), block))
+                named(self.node_sets, name).entries.append(Entry(np.array([first, last]), block))
             between = ends[0] + share[1:-1, None] * (ends[1] - ends[0])
             self.add_nodes(first + step * np.arange(1, n), between, block)
 
@@ -188,7 +164,7 @@ class Part:
         """Elements by number, into the set that their keyword names as well."""
         self.elements.append(elements)
         if name := elements.block.parameters.get("ELSET"):
-            _named(self.element_sets, name).entries.append(Entry(elements.numbers, elements.block))
+            named(self.element_sets, name).entries.append(Entry(elements.numbers, elements.block))
 
     @staticmethod
     def _rows(block: Block, size: int, kind: str) -> np.ndarray:
@@ -232,12 +208,12 @@ class Part:
         """`*ELGEN`: rows and layers of copies of an element, its nodes counted on."""
         for i, row in Numbers(block, whole=True).rows():
             master = int(row[0])
-            own = next((e for e in self.elements if (e.numbers == master).any()), None)
-            if own is None:
+            source = next((e for e in self.elements if (e.numbers == master).any()), None)
+            if source is None:
                 raise block.error(f"*ELGEN copies an element that exists; got {master}", i)
-            numbers, nodes = np.array([master]), own.nodes[own.numbers == master]
+            numbers, nodes = np.array([master]), source.nodes[source.numbers == master]
             if not nodes.size:
-                raise block.error(f"*ELGEN of elements {own.kind} is not read", i)
+                raise block.error(f"*ELGEN of elements {source.kind} is not read", i)
             steps = [int(x) for x in row[1:]]
             if len(steps) > 9:
                 raise block.error("*ELGEN takes up to 10 numbers", i)
@@ -249,64 +225,21 @@ class Part:
                 copies = np.arange(n)
                 numbers = (numbers + by_element * copies[:, None]).ravel()
                 nodes = (nodes + by_node * copies[:, None, None]).reshape(len(numbers), -1)
-            generated = Elements(own.kind, own.cell, numbers[1:], nodes[1:], own.block, own.user)
+            generated = Elements(source.kind, source.cell, numbers[1:], nodes[1:], source.block, source.user)
             self.elements.append(generated)
-            for name, known in ((own.block.parameters.get("ELSET"), numbers[1:]),
+            for name, known in ((source.block.parameters.get("ELSET"), numbers[1:]),
                                 (block.parameters.get("ELSET"), numbers)):
                 if name:
-                    _named(self.element_sets, name).entries.append(Entry(known, block))
+                    named(self.element_sets, name).entries.append(Entry(known, block))
 
     def read_set(self, block: Block) -> None:
         """`*NSET` or `*ELSET`."""
         sets = self.node_sets if block.keyword == "NSET" else self.element_sets
-        entries = _named(sets, block.need(block.keyword)).entries
-        instance = block.parameters.get("INSTANCE", "")
-        if block.keyword == "NSET" and (source := block.parameters.get("ELSET")):
-            entries.append(Entry(source, block, None, instance, other=True))
-        if "GENERATE" in block.parameters:
-            for i, row in Numbers(block, whole=True).rows():
-                first, last, step = (*map(int, row), *([1] if len(row) == 2 else []))[:3] if len(row) > 1 else (1, 0, 0)
-                if len(row) > 3 or step < 1 or first > last:
-                    raise block.error("a line of GENERATE is first, last and step, ascending; got "
-                                      + ", ".join(str(int(x)) for x in row), i)
-                entries.append(Entry((first, last, step), block, i, instance))
-            return
-        read = Numbers(block, whole=True)
-        texts = [block.data[i].strip() for i in read.at]
-        joined = ",".join(t[:-1] if t.endswith(",") else t for t in texts)
-        many = read.many(joined.split(",")) if texts and "_" not in joined else None
-        if many is not None:
-            entries.append(Entry(many, block, None, instance))
-            return
-        for i, entered in block.rows():
-            for word in filter(None, entered):
-                plain = word.lstrip("+-").replace(".", "").isdecimal() or not word[:1].strip("+-.")
-                entries.append(Entry(np.array([int(number(block, i, word, whole=True))]) if plain else word, block, i,
-                                     instance))
+        read_set(block, named(sets, block.need(block.keyword)))
 
     def read_surface(self, block: Block) -> None:
-        """`*SURFACE` of elements, of nodes, or several together."""
-        surface = _named(self.surfaces, block.need("NAME"))
-        surface.kind = block.parameters.get("TYPE", "ELEMENT").upper()
-        if "COMBINE" in block.parameters:
-            how = block.parameters["COMBINE"].upper()
-            if how != "UNION":
-                raise block.error(f"the surface {surface.name[:60]!r} is made by COMBINE={how[:20]}, which is not "
-                                  "read: write its faces")
-            surface.kind = "UNION"
-        if "CROP" in block.parameters:
-            raise block.error(f"the surface {surface.name[:60]!r} is made by CROP=, which is not read: write its faces")
-        for i, row in block.rows():
-            names = row if surface.kind == "UNION" else row[:1]
-            for word in names:
-                numeric = word.isdecimal()
-                members: np.ndarray | str = np.array([int(number(block, i, word, whole=True))]) if numeric else word
-                face = row[1].upper() if surface.kind == "ELEMENT" and len(row) > 1 else ""
-                surface.entries.append(Entry(members, block, i, "", face))
-
-
-def _named(sets: dict[str, Named], name: str) -> Named:
-    return sets.setdefault(name.lower(), Named(name))
+        """`*SURFACE`."""
+        read_surface(block, named(self.surfaces, block.need("NAME")))
 
 
 def _of(name: str) -> str:

@@ -23,12 +23,12 @@ class System:
     @classmethod
     def of(cls, block: Block) -> System:
         """That of `*SYSTEM`: an origin, a point on the first axis and one in the plane of the first two."""
-        given: list[float] = []
+        coordinates: list[float] = []
         for _, row in Numbers(block, whole=False).rows():
-            given += [*row, *[0.0] * (-len(row) % 3)]
-        if len(given) not in (0, 3, 6, 9):
-            raise block.error(f"*SYSTEM takes one, two or three points; got {len(given)} numbers")
-        points = np.array(given).reshape(-1, 3)
+            coordinates += [*row, *[0.0] * (-len(row) % 3)]
+        if len(coordinates) not in (0, 3, 6, 9):
+            raise block.error(f"*SYSTEM takes one, two or three points; got {len(coordinates)} numbers")
+        points = np.array(coordinates).reshape(-1, 3)
         axes = np.eye(3)
         if len(points) > 1 and (points[1] != points[0]).any():
             along = (points[1] - points[0]) / np.linalg.norm(points[1] - points[0])

@@ -7,7 +7,8 @@ from collections.abc import Iterable
 import numpy as np
 
 from .abaqus_lines import Block
-from .abaqus_parts import Elements, Entry, Named, Part
+from .abaqus_named import Entry, Named
+from .abaqus_parts import Elements, Part
 from .abaqus_types import FACES
 from .unreadable import Unreadable
 
@@ -35,13 +36,13 @@ class Numbering:
 
     def range(self, first: int, last: int, step: int) -> tuple[np.ndarray, int | None]:
         """Places of the numbers of a range, and the first of these that there is not."""
-        own = self.sorted[np.searchsorted(self.sorted, first):np.searchsorted(self.sorted, last, "right")]
-        own = own[(own - first) % step == 0]
+        found = self.sorted[np.searchsorted(self.sorted, first):np.searchsorted(self.sorted, last, "right")]
+        found = found[(found - first) % step == 0]
         missing = None
-        if len(own) != (last - first) // step + 1:
-            wrong = np.flatnonzero(own != first + step * np.arange(len(own)))
-            missing = first + step * int(wrong[0] if len(wrong) else len(own))
-        return self.places(own)[0], missing
+        if len(found) != (last - first) // step + 1:
+            wrong = np.flatnonzero(found != first + step * np.arange(len(found)))
+            missing = first + step * int(wrong[0] if len(wrong) else len(found))
+        return self.places(found)[0], missing
 
 
 class Placed:
@@ -94,21 +95,21 @@ class Body:
         nodes = Numbering(numbers, len(self.points))
         self.points = np.concatenate([self.points, points])
         first = self.n_elements
-        for own in part.elements:
-            places, there = nodes.places(own.nodes)
-            if own.user is None and own.cell in ("", "line"):
+        for group in part.elements:
+            places, there = nodes.places(group.nodes)
+            if group.user is None and group.cell in ("", "line"):
                 places = np.where(there, places, -1)
             elif not there.all():
                 row, column = np.argwhere(~there)[0]
-                raise own.block.error(f"element {own.numbers[row]} has the node {own.nodes[row, column]}, which does "
-                                      "not exist")
-            self.blocks.append((own, self.n_elements, places))
-            self.n_elements += len(own.numbers)
-        all_numbers = np.concatenate([np.zeros(0, np.int64), *(own.numbers for own in part.elements)])
+                raise group.block.error(f"element {group.numbers[row]} has the node {group.nodes[row, column]}, which "
+                                        "does not exist")
+            self.blocks.append((group, self.n_elements, places))
+            self.n_elements += len(group.numbers)
+        all_numbers = np.concatenate([np.zeros(0, np.int64), *(group.numbers for group in part.elements)])
         elements = Numbering(all_numbers, first)
         if len(again := np.flatnonzero(np.diff(elements.sorted) == 0)):
             late = max(elements.order[again[0]:again[0] + 2])
-            ends = np.cumsum([len(own.numbers) for own in part.elements])
+            ends = np.cumsum([len(group.numbers) for group in part.elements])
             block = part.elements[int(np.searchsorted(ends, late, "right"))].block
             raise block.error(f"element {elements.sorted[again[0]]} is given twice")
         self.placed[name.lower()] = Placed(name, part, nodes, elements)
@@ -197,9 +198,9 @@ class Body:
 
     def _faces(self, members: np.ndarray, entry: Entry, name: str, faces_are_cells: bool) -> Iterable[np.ndarray]:
         face, used = entry.face, 0
-        for own, at, nodes in self.blocks:
+        for group, at, nodes in self.blocks:
             mine = members[(members >= at) & (members < at + len(nodes))] - at
-            base = base_of(own.cell)
+            base = base_of(group.cell)
             if not len(mine) or base not in FACES:
                 continue
             forms = FACES[base]
@@ -216,7 +217,7 @@ class Body:
                     face[0] == "S" or len(forms[0]) == 2):
                 yield nodes[mine][:, forms[int(face[1:3]) - 1]]
             else:
-                raise entry.block.error(f"elements of type {own.kind} have no face {face[:10]!r}, which the surface "
+                raise entry.block.error(f"elements of type {group.kind} have no face {face[:10]!r}, which the surface "
                                         f"{name[:60]!r} names", entry.line)
             used += len(mine)
         if used < len(members):
@@ -227,11 +228,12 @@ class Body:
     def free(self) -> list[np.ndarray]:
         """Whether face k of each element is one of no other element, by k."""
         if not hasattr(self, "_free"):
-            solid = any(len(FACES[base_of(own.cell)][0]) > 2 for own, _, _ in self.blocks if base_of(own.cell) in FACES)
+            solid = any(len(FACES[base_of(group.cell)][0]) > 2 for group, _, _ in self.blocks
+                        if base_of(group.cell) in FACES)
             corners, owner, number = [], [], []
-            for own, at, nodes in self.blocks:
-                for k, form in enumerate(FACES.get(base_of(own.cell), ())):
-                    if solid == (len(FACES[base_of(own.cell)][0]) > 2) and len(nodes):
+            for group, at, nodes in self.blocks:
+                for k, form in enumerate(FACES.get(base_of(group.cell), ())):
+                    if solid == (len(FACES[base_of(group.cell)][0]) > 2) and len(nodes):
                         own_rows = np.full((len(nodes), 4 if solid else 2), -1)
                         own_rows[:, :len(form)] = np.sort(nodes[:, form], axis=1)
                         corners.append(own_rows)

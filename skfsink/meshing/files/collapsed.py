@@ -32,7 +32,7 @@ def uncollapsed(mesh: meshio.Mesh) -> None:
                 found.setdefault(form[0], []).append((e, form[1]))
         if found:
             _take_out(mesh, i, found)
-            what = ", ".join(f"{len(own)} {name}" for name, own in found.items())
+            what = ", ".join(f"{len(members)} {name}" for name, members in found.items())
             add_note(mesh, f"{sum(map(len, found.values()))} cell(s) ({mesh.cells[i].type}) with a node twice were "
                            f"taken for what they are: {what}")
 
@@ -70,13 +70,13 @@ def _take_out(mesh: meshio.Mesh, number: int, found: dict[str, list[tuple[int, l
     block, first = mesh.cells[number], len(mesh.cells)
     keep = np.ones(len(block.data), bool)
     place = np.full((len(block.data), 2), -1)  # new block and number there
-    for k, (kind, own) in enumerate(found.items()):
-        members = [e for e, _ in own]
-        keep[members] = False
-        place[members] = np.column_stack([np.full(len(own), k), np.arange(len(own))])
-        mesh.cells.append(meshio.CellBlock(kind, np.array([nodes for _, nodes in own])))
+    for k, (kind, members) in enumerate(found.items()):
+        rows = [e for e, _ in members]
+        keep[rows] = False
+        place[rows] = np.column_stack([np.full(len(members), k), np.arange(len(members))])
+        mesh.cells.append(meshio.CellBlock(kind, np.array([nodes for _, nodes in members])))
         for data in mesh.cell_data.values():
-            data.append(np.asarray(data[number])[members])
+            data.append(np.asarray(data[number])[rows])
     index = np.cumsum(keep) - 1
     mesh.cells[number] = meshio.CellBlock(block.type, block.data[keep])
     for data in mesh.cell_data.values():

@@ -114,8 +114,8 @@ def _add_planes(mesh: meshio.Mesh, planes: Sequence[tuple[str, int, str | float]
     for sets in mesh.cell_sets.values():
         sets.extend([None] * (len(mesh.cells) - len(sets)) + [np.zeros(0, np.int64)])
     n = len(mesh.cells)
-    for name, own in members.items():
-        mesh.cell_sets[name] = [np.zeros(0, np.int64)] * n + [np.searchsorted(kept, own)]
+    for name, chosen in members.items():
+        mesh.cell_sets[name] = [np.zeros(0, np.int64)] * n + [np.searchsorted(kept, chosen)]
     mesh.cells.append(meshio.CellBlock(facet, facets[kept]))
 
 
@@ -125,12 +125,12 @@ def _plain(mesh: meshio.Mesh) -> meshio.Mesh:
     points = {name: np.unique(nodes) for name, nodes in mesh.point_sets.items() if len(nodes)}
     sets: dict[str, list[np.ndarray]] = {}
     for name, members in mesh.cell_sets.items():
-        own = [np.asarray([] if m is None else m, np.int64) for m in members]
-        for block, index in zip(mesh.cells, own):
+        indices = [np.asarray([] if m is None else m, np.int64) for m in members]
+        for block, index in zip(mesh.cells, indices):
             if block.type == "vertex" and len(index):
                 points[name] = np.union1d(points.get(name, np.zeros(0, np.int64)), block.data[index].ravel())
-        own += [np.zeros(0, np.int64)] * (len(mesh.cells) - len(own))
-        if not name.startswith("gmsh:") and any(len(own[i]) for i in kept):
-            sets[name] = [own[i] for i in kept]
+        indices += [np.zeros(0, np.int64)] * (len(mesh.cells) - len(indices))
+        if not name.startswith("gmsh:") and any(len(indices[i]) for i in kept):
+            sets[name] = [indices[i] for i in kept]
     points = {name: nodes for name, nodes in points.items() if not name.startswith("gmsh:")}
     return meshio.Mesh(mesh.points, [mesh.cells[i] for i in kept], cell_sets=sets, point_sets=points, info=mesh.info)

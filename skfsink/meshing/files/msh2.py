@@ -81,8 +81,8 @@ def _block_2(kind: int, nodes: np.ndarray, groups: np.ndarray, entities: np.ndar
     An element that is in one group twice is left as it is: there are two.
     """
     place = np.arange(len(nodes))
-    (own, entity), (others, group) = (np.unique(tags, return_inverse=True) for tags in (entities, groups))
-    if len(np.unique(entity.ravel() * len(others) + group.ravel())) > len(own):  # an entity has several groups
+    (single, entity), (others, group) = (np.unique(tags, return_inverse=True) for tags in (entities, groups))
+    if len(np.unique(entity.ravel() * len(others) + group.ravel())) > len(single):  # an entity has several groups
         rows = np.column_stack([np.sort(nodes, axis=1), entities])
         _, first, same = np.unique(rows, axis=0, return_index=True, return_inverse=True)
         if len(first) < len(rows) == len(np.unique(np.column_stack([rows, groups]), axis=0)):

@@ -59,7 +59,7 @@ def nodes_of(kind: int) -> int:
     return NODES[kind]
 
 
-def agree(found: int, said: int, numbers: Any) -> None:
+def agree(found: int, claimed: int, numbers: Any) -> None:
     """Raise Unreadable if a section has not as many entries as it says."""
-    if found != said:
-        raise Unreadable(f"{numbers.where} says that it has {said} entries, and has {found}")
+    if found != claimed:
+        raise Unreadable(f"{numbers.where} says that it has {claimed} entries, and has {found}")

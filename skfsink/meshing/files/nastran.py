@@ -82,8 +82,8 @@ def read_nastran(path: Path) -> meshio.Mesh:
         raise Unreadable("it has no grid points")
     tags = np.array(list(points), np.int64)
     notes = [f"{n} card(s) {card} were left out" for card, n in sorted(left_out.items())]
-    there = {name: np.array([node for node in points if node in single or any(node in own for own in ranges)], np.int64)
-             for name, (single, ranges) in held.items()}
+    there = {name: np.array([node for node in points if node in single or any(node in numbers for numbers in ranges)],
+                            np.int64) for name, (single, ranges) in held.items()}
     return meshio.Mesh(np.array(list(points.values())),
                        [(name, places(tags, np.array([nodes for nodes, _ in rows], np.int64))
                          [:, ORDER.get(name, slice(None))]) for name, rows in cells.items()],
@@ -135,13 +135,13 @@ def _cards(lines: list[str]) -> Iterator[tuple[int, str, list[str]]]:
             continue
         if line[:7].upper() == "ENDDATA":
             break
-        first, own = _fields(line)
+        first, more = _fields(line)
         if first in ("", "+", "*") or first[0] in "+*":
-            fields += own
+            fields += more
             continue
         if name:
             yield number, name, fields
-        number, name, fields = at, first.rstrip("*").strip().upper(), own
+        number, name, fields = at, first.rstrip("*").strip().upper(), more
     if name:
         yield number, name, fields
 

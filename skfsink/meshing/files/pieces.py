@@ -109,8 +109,8 @@ def merged(name: str, mesh: meshio.Mesh, tolerance: float) -> meshio.Mesh:
     kept = np.unique(group, return_index=True)[1]  # by group, the first node of each
     rank = np.argsort(np.argsort(kept))
     for i, nodes in enumerate(cells):
-        own = np.sort(group[nodes], axis=1)
-        if (lost := (own[:, 1:] == own[:, :-1]).any(axis=1)).any():
+        groups = np.sort(group[nodes], axis=1)
+        if (lost := (groups[:, 1:] == groups[:, :-1]).any(axis=1)).any():
             e = int(lost.argmax())
             raise MeshError(f"mesh {name}: merging nodes within {tolerance:g} mm joins a chain of them and would "
                             f"collapse element {e + sum(len(c) for c in cells[:i])} near "

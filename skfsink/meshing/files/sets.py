@@ -41,28 +41,28 @@ def named_sets(mesh: meshio.Mesh) -> meshio.Mesh:
     for key, values in list(mesh.cell_data.items()):
         if any(len(part) != len(block.data) for part, block in zip(values, mesh.cells, strict=True)):
             raise Unreadable(f"its data {key} are not as many as its cells")
-        own = key.startswith(BOUNDARY_PREFIX)
+        is_boundary = key.startswith(BOUNDARY_PREFIX)
         for name, mask in _masks(key, values):
             members = [np.flatnonzero(part) for part in np.split(mask, starts)]
             lower = [block.data[index].ravel() for block, dim, index in zip(mesh.cells, dims, members)
                      if dim < body - 1 and len(index)]
             if any(len(index) for dim, index in zip(dims, members) if dim == body - 1):
                 facets.add(name)
-            if lower and (own or name not in facets):
+            if lower and (is_boundary or name not in facets):
                 nodes.setdefault(name, []).extend(lower)
             members = [index if dim >= body - 1 else index[:0] for dim, index in zip(dims, members)]
-            if any(len(index) for index in members) or (own and not lower):
+            if any(len(index) for index in members) or (is_boundary and not lower):
                 mesh.cell_sets.setdefault(name, members)
-        if own:
+        if is_boundary:
             del mesh.cell_data[key]
     for key, values in list(mesh.point_data.items()):
         if len(values) != len(mesh.points):
             raise Unreadable(f"its data {key} are not as many as its points")
-        own = key.startswith(BOUNDARY_PREFIX)
+        is_boundary = key.startswith(BOUNDARY_PREFIX)
         for name, mask in _masks(key, [values]):
-            if own or (name not in nodes and name not in facets):
+            if is_boundary or (name not in nodes and name not in facets):
                 nodes.setdefault(name, []).append(np.flatnonzero(mask))
-        if own:
+        if is_boundary:
             del mesh.point_data[key]
     for name, parts in nodes.items():
         mesh.point_sets.setdefault(name, np.unique(np.concatenate(parts)).astype(np.int64))

@@ -8,30 +8,17 @@ alone, so that neighbours of any kind fit. At the tip of a pyramid four edges me
 
 from __future__ import annotations
 
-from functools import cache
-
 import meshio
 import numpy as np
 
 from ...errors import MeshError
+from .edges_faces import EDGES, FACES, PARTS, Topology, cycles, edges_of, facets, numbered, parts_of
 from .tidy import CORNERS, add_note, base_of, body_blocks, drop_cells, drop_empty, place, renumber
 
 __all__ = ["PLURALS", "counted", "drop_others", "needs_split", "split"]
 
 PLURALS = {"triangle": "triangles", "quad": "quadrilaterals", "tetra": "tetrahedra", "wedge": "wedges",
            "pyramid": "pyramids", "hexahedron": "hexahedra"}
-EDGES = {
-    "line": ((0, 1),), "triangle": ((0, 1), (1, 2), (2, 0)), "quad": ((0, 1), (1, 2), (2, 3), (3, 0)),
-    "tetra": ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)),
-    "wedge": ((0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5)),
-    "hexahedron": ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))}
-FACES = {
-    "triangle": ((0, 1, 2),), "quad": ((0, 1, 2, 3),),
-    "tetra": ((0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)),
-    "wedge": ((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
-    "hexahedron": ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))}
-#: cells of second order: the nodes in the middle of their edges follow those at the corners, in the order of EDGES
-SECOND = ("line3", "triangle6", "quad8", "quad9", "tetra10", "wedge15", "wedge18", "hexahedron20", "hexahedron27")
 OFF = 0.2  # a middle node further from the middle of its edge than this, over the edge, is not taken for it
 
 
@@ -84,64 +71,39 @@ def split(mesh: meshio.Mesh) -> meshio.Mesh:
         if kind not in EDGES and kind != "vertex":
             _drop(mesh, i, np.zeros(len(mesh.cells[i].data), bool))
     for i in body:
-        own = np.sort(mesh.cells[i].data[:, :CORNERS[kinds[i]]], axis=1)
-        if (twice := (own[:, 1:] == own[:, :-1]).any(axis=1)).any():
-            where = mesh.points[own[twice][0]].mean(axis=0)
+        corners = np.sort(mesh.cells[i].data[:, :CORNERS[kinds[i]]], axis=1)
+        if (twice := (corners[:, 1:] == corners[:, :-1]).any(axis=1)).any():
+            where = mesh.points[corners[twice][0]].mean(axis=0)
             raise MeshError(f"{np.count_nonzero(twice)} of the {PLURALS[kinds[i]]} have a node twice, such as one near "
                             f"{place(where)}: mend the mesh there")
     _drop_strangers(mesh, kinds, body, dim)
-    corners = [block.data[:, :CORNERS.get(kind, 1)].astype(np.int64) for kind, block in zip(kinds, mesh.cells)]
-
-    # --- edges, and what is in their middle ---
-    edges, edge_of = _numbered([c[:, EDGES[k]] if k in EDGES else c[:0, None] for k, c in zip(kinds, corners)], 2)
-    ends = mesh.points[edges]
-    middle = np.full(len(edges), -1)
-    for block, kind, own in zip(mesh.cells, kinds, edge_of):
-        if block.type in SECOND:
-            middle[own] = block.data[:, CORNERS[kind]:CORNERS[kind] + own.shape[1]]
-    at = ends.mean(axis=1)
-    away = np.linalg.norm(mesh.points[middle] - at, axis=1) / np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    taken = (middle >= 0) & (away <= OFF)
-    at[taken] = mesh.points[middle[taken]]
-    if (middle >= 0).any():
-        add_note(mesh, f"{np.count_nonzero(taken)} middle node(s) of elements of second order are corners now")
-        if (odd := np.count_nonzero((middle >= 0) & ~taken)):
-            add_note(mesh, f"{odd} middle node(s) were not near the middle of their edges, which are straight now")
-
-    # --- faces ---
-    solid = dim == 3
-    faces, face_of = _numbered([_cycles(c, FACES[k]) if solid and k in FACES else c[:0, None]
-                                for k, c in zip(kinds, corners)], 4)
-    face_at = np.zeros((len(faces), 3))
-    for kind, own_edges, own in zip(kinds, edge_of, face_of):
-        for j, cycle in enumerate(FACES[kind] if own.size else ()):
-            face_at[own[:, j]] = at[own_edges[:, _edges_of(kind, cycle)]].mean(axis=1)
-
-    # --- nodes and cells ---
-    points, cells, centres = [mesh.points, at, face_at], [], []
-    first = n + len(edges) + len(faces)
-    for i, (kind, c) in enumerate(zip(kinds, corners)):
+    topology = Topology.of(mesh)
+    edge_at, face_at = _middles(topology)
+    edge_of, middle, n_edges = topology.edge_of, topology.middle, len(topology.edges)
+    points, cells, centres = [mesh.points, edge_at, face_at], [], []
+    first = n + n_edges + len(topology.faces)
+    for i, (kind, c) in enumerate(zip(kinds, topology.corners)):
         columns = [c]
         if kind in EDGES:
             columns.append(n + edge_of[i])
         if kind in FACES:
-            if solid:
-                columns.append(n + len(edges) + face_of[i])
+            if dim == 3:
+                columns.append(n + n_edges + topology.face_of[i])
             if i in body:
                 columns.append(first + np.arange(len(c))[:, None])
-                points.append(at[edge_of[i]].mean(axis=1))
+                points.append(edge_at[edge_of[i]].mean(axis=1))
                 centres.append(columns[-1][:, 0])
                 first += len(c)
-        parts = _parts(kind)
+        parts = parts_of(kind)
         stack = np.concatenate(columns, axis=1)
         cells.append((PARTS.get(kind, kind), stack[:, parts].reshape(-1, parts.shape[1])))
-    sets = _sets_of_nodes(mesh, body, dim, edges, faces, middle, edge_of, face_of, corners, centres)
+    sets = _sets_of_nodes(topology, centres)
     number = np.arange(first)
     number[middle[middle >= 0]] = n + np.flatnonzero(middle >= 0)  # for points on middle nodes
     cells = [(kind, number[nodes]) for kind, nodes in cells]
-    many = [len(_parts(kind)) for kind in kinds]
-    cell_sets = {name: [None if own is None else (np.asarray(own, np.int64)[:, None] * k + np.arange(k)).ravel()
-                        for own, k in zip(members, many)] for name, members in mesh.cell_sets.items()}
+    many = [len(parts_of(kind)) for kind in kinds]
+    cell_sets = {name: [None if chosen is None else (np.asarray(chosen, np.int64)[:, None] * k + np.arange(k)).ravel()
+                        for chosen, k in zip(members, many)] for name, members in mesh.cell_sets.items()}
     cell_data = {name: [np.repeat(values, k, axis=0) for values, k in zip(data, many)]
                  for name, data in mesh.cell_data.items()}
     new = meshio.Mesh(np.vstack(points), cells, cell_sets=cell_sets, cell_data=cell_data, point_sets=sets,
@@ -154,80 +116,33 @@ def split(mesh: meshio.Mesh) -> meshio.Mesh:
     return new
 
 
-#: the parts of a cell
-PARTS = {"triangle": "quad", "tetra": "hexahedron", "wedge": "hexahedron"}
-_REFERENCE = {"tetra": ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)),
-              "wedge": ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (0, 1, 1)),
-              "hexahedron": ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1))}
-
-
-@cache
-def _parts(kind: str) -> np.ndarray:
-    """Nodes of the parts of a cell, of its corners, edges, faces (in space) and its centre, in that order."""
-    if kind not in EDGES:
-        return np.zeros((1, 1), int)
-    n, edges = CORNERS[kind], [frozenset(edge) for edge in EDGES[kind]]
-    if kind == "line":
-        return np.array([[0, 2], [2, 1]])
-    if kind in ("triangle", "quad"):
-        return np.array([[i, n + i, 2 * n, n + (i - 1) % n] for i in range(n)])
-    faces, corners = [frozenset(face) for face in FACES[kind]], np.array(_REFERENCE[kind])
-    centre, parts = n + len(edges) + len(faces), []
-    for v in range(n):
-        a, b, c = (next(iter(edge - {v})) for edge in edges if v in edge)
-        if np.linalg.det(corners[[a, b, c]] - corners[v]) < 0:
-            a, b = b, a
-        on = {w: n + edges.index(frozenset((v, w))) for w in (a, b, c)}
-        ab, bc, ca = (n + len(edges) + next(i for i, face in enumerate(faces) if {v, *pair} <= face)
-                      for pair in ((a, b), (b, c), (c, a)))
-        parts.append([v, on[a], ab, on[b], on[c], ca, centre, bc])
-    return np.array(parts)
-
-
-def _edges_of(kind: str, cycle: tuple[int, ...]) -> list[int]:
-    """Numbers of the edges of a cell that bound one of its faces."""
-    edges = [frozenset(edge) for edge in EDGES[kind]]
-    return [edges.index(frozenset((a, b))) for a, b in zip(cycle, (*cycle[1:], cycle[0]))]
-
-
-def _cycles(corners: np.ndarray, faces: tuple[tuple[int, ...], ...]) -> np.ndarray:
-    """Nodes of the faces of cells, (ne, faces, 4); the last one of a triangle is -1."""
-    padded = np.concatenate([corners, np.full((len(corners), 1), -1)], axis=1)
-    return padded[:, [(*face, -1)[:4] for face in faces]]
-
-
-def _numbered(tables: list[np.ndarray], width: int) -> tuple[np.ndarray, list[np.ndarray]]:
-    """The different rows, whatever the order in each, of tables (ne, k, width), and their numbers (ne, k)."""
-    rows = np.concatenate([table.reshape(-1, width) if table.size else np.zeros((0, width), np.int64)
-                           for table in tables])
-    rows = np.sort(rows, axis=1)
-    order = np.lexsort(rows.T[::-1])
-    ordered = rows[order]
-    fresh = np.ones(len(rows), bool)
-    fresh[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
-    number = np.empty(len(rows), np.int64)
-    number[order] = np.cumsum(fresh) - 1
-    sizes = [table.shape[:2] if table.size else (0, 0) for table in tables]
-    ends = np.cumsum([a * b for a, b in sizes])
-    return ordered[fresh], [number[end - a * b:end].reshape(a, b) for end, (a, b) in zip(ends, sizes)]
-
-
-def _facets(kind: str, corners: np.ndarray, dim: int) -> np.ndarray:
-    """Edges of plane cells, faces of others, (ne, k, 4) with -1 for what is not there."""
-    if dim == 3:
-        return _cycles(corners, FACES[kind])
-    pairs = corners[:, EDGES[kind]]
-    return np.concatenate([pairs, np.full_like(pairs, -1)], axis=2)
+def _middles(topology: Topology) -> tuple[np.ndarray, np.ndarray]:
+    """Points in the middle of the edges and of the faces; edges bend to nodes that are near their middle."""
+    mesh, middle = topology.mesh, topology.middle
+    ends = mesh.points[topology.edges]
+    at = ends.mean(axis=1)
+    away = np.linalg.norm(mesh.points[middle] - at, axis=1) / np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    taken = (middle >= 0) & (away <= OFF)
+    at[taken] = mesh.points[middle[taken]]
+    if (middle >= 0).any():
+        add_note(mesh, f"{np.count_nonzero(taken)} middle node(s) of elements of second order are corners now")
+        if (odd := np.count_nonzero((middle >= 0) & ~taken)):
+            add_note(mesh, f"{odd} middle node(s) were not near the middle of their edges, which are straight now")
+    face_at = np.zeros((len(topology.faces), 3))
+    for kind, edge_numbers, face_numbers in zip(topology.kinds, topology.edge_of, topology.face_of):
+        for j, cycle in enumerate(FACES[kind] if face_numbers.size else ()):
+            face_at[face_numbers[:, j]] = at[edge_numbers[:, edges_of(kind, cycle)]].mean(axis=1)
+    return at, face_at
 
 
 def _drop_strangers(mesh: meshio.Mesh, kinds: list[str], body: list[int], dim: int) -> None:
     """Drop lines and faces that are no edge or face of an element; refuse facets of more than two elements."""
     corners = [block.data[:, :CORNERS.get(kind, 1)].astype(np.int64) for kind, block in zip(kinds, mesh.cells)]
     outer = [i for i, block in enumerate(mesh.cells) if block.dim == dim - 1 and kinds[i] in EDGES]
-    sides = [_facets(kinds[i], corners[i], dim) for i in body]
-    own = [_cycles(c, (tuple(range(c.shape[1])),)) if dim == 3 else
-           np.concatenate([c, np.full_like(c, -1)], axis=1)[:, None] for c in (corners[i] for i in outer)]
-    rows, numbers = _numbered([*sides, *own], 4)
+    sides = [facets(kinds[i], corners[i], dim) for i in body]
+    outer_sides = [cycles(c, (tuple(range(c.shape[1])),)) if dim == 3 else
+                   np.concatenate([c, np.full_like(c, -1)], axis=1)[:, None] for c in (corners[i] for i in outer)]
+    rows, numbers = numbered([*sides, *outer_sides], 4)
     count = np.bincount(np.concatenate([x.ravel() for x in numbers[:len(body)]]), minlength=len(rows))
     if (count > 2).any():
         where = rows[np.argmax(count > 2)]
@@ -237,8 +152,8 @@ def _drop_strangers(mesh: meshio.Mesh, kinds: list[str], body: list[int], dim: i
     for i, found in zip(outer, numbers[len(body):]):
         _drop(mesh, i, count[found[:, 0]] > 0 if len(found) else np.zeros(0, bool))
     if dim == 3:
-        rows, numbers = _numbered([c[:, EDGES[k]] if k in EDGES and (i in body or k == "line") else c[:0, None]
-                                   for i, (k, c) in enumerate(zip(kinds, corners))], 2)
+        rows, numbers = numbered([c[:, EDGES[k]] if k in EDGES and (i in body or k == "line") else c[:0, None]
+                                  for i, (k, c) in enumerate(zip(kinds, corners))], 2)
         there = np.zeros(len(rows), bool)
         for i in body:
             there[numbers[i]] = True
@@ -255,20 +170,20 @@ def _drop(mesh: meshio.Mesh, number: int, keep: np.ndarray) -> None:
         drop_cells(mesh, number, keep)
 
 
-def _sets_of_nodes(mesh: meshio.Mesh, body: list[int], dim: int, edges: np.ndarray, faces: np.ndarray,
-                   middle: np.ndarray, edge_of: list[np.ndarray], face_of: list[np.ndarray],
-                   corners: list[np.ndarray], centres: list[np.ndarray]) -> dict[str, np.ndarray]:
-    """The sets of nodes with the new ones that belong to them; see :func:`split`."""
+def _sets_of_nodes(topology: Topology, centres: list[np.ndarray]) -> dict[str, np.ndarray]:
+    """The sets of nodes with the new nodes that belong to them, see :func:`split`; `centres` are those of elements."""
+    mesh, body, dim = topology.mesh, topology.body, topology.dim
+    edges, faces, middle, corners = topology.edges, topology.faces, topology.middle, topology.corners
     if not mesh.point_sets:
         return {}
-    n, kinds = len(mesh.points), [base_of(block.type) for block in mesh.cells]
-    sides = face_of if dim == 3 else edge_of
+    n = len(mesh.points)
+    sides = topology.face_of if dim == 3 else topology.edge_of
     count = np.bincount(np.concatenate([sides[i].ravel() for i in body]), minlength=len(faces if dim == 3 else edges))
     outside, outer_edge = np.zeros(n + 1, bool), count == 1
     if dim == 3:
         outer_face = count == 1
         outside[faces[outer_face]] = True
-        outer_edge = _bounding(edge_of, face_of, kinds, body, outer_face)
+        outer_edge = topology.bounding(outer_face)
     else:
         outside[edges[outer_edge]] = True
     outside[-1] = True  # what stands for no node
@@ -285,20 +200,10 @@ def _sets_of_nodes(mesh: meshio.Mesh, body: list[int], dim: int, edges: np.ndarr
         elif dim == 3:
             whole_face &= outer_face
             parts += [n + len(edges) + np.flatnonzero(whole_face)]
-            whole = _bounding(edge_of, face_of, kinds, body, whole_face) if whole_face.any() else whole & outer_edge
+            whole = topology.bounding(whole_face) if whole_face.any() else whole & outer_edge
         else:
             whole &= outer_edge
-        given = np.isin(middle, nodes) & (middle >= 0)
-        parts.append(n + np.flatnonzero(np.where(middle >= 0, given, whole)))
+        listed = np.isin(middle, nodes) & (middle >= 0)
+        parts.append(n + np.flatnonzero(np.where(middle >= 0, listed, whole)))
         sets[name] = np.unique(np.concatenate(parts))  # those that are middle nodes go with them
     return sets
-
-
-def _bounding(edge_of: list[np.ndarray], face_of: list[np.ndarray], kinds: list[str], body: list[int],
-              chosen: np.ndarray) -> np.ndarray:
-    """Mask of the edges of the `chosen` faces, a mask."""
-    found = np.zeros(max(int(own.max()) for own in edge_of if own.size) + 1, bool)
-    for i in body:
-        for j, cycle in enumerate(FACES[kinds[i]]):
-            found[edge_of[i][chosen[face_of[i][:, j]]][:, _edges_of(kinds[i], cycle)]] = True
-    return found

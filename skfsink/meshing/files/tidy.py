@@ -108,8 +108,8 @@ def drop_cells(mesh: meshio.Mesh, number: int, keep: np.ndarray) -> None:
     mesh.cells[number] = meshio.CellBlock(block.type, block.data[keep])
     index = np.cumsum(keep) - 1
     for name, members in list(mesh.cell_sets.items()):
-        if number < len(members) and (own := members[number]) is not None and len(own):
-            members[number] = index[own[keep[own]]]
+        if number < len(members) and (cells := members[number]) is not None and len(cells):
+            members[number] = index[cells[keep[cells]]]
             if not len(members[number]) and not any(m is not None and len(m) for m in members):
                 _leave_out(mesh, name, "parts that are no part of the body")
                 del mesh.cell_sets[name]
