@@ -12,7 +12,7 @@ from ..errors import OutputError
 
 __all__ = ["HIDDEN", "prepare_folder", "replaced", "reported", "write_atomic"]
 
-HIDDEN = (".lock", ".running")  # files of a lock, see :mod:`.occupied`; a folder that has no others is empty
+HIDDEN = (".lock", ".running")  # files of the lock of a run; a folder that has no others counts as empty
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""Folders to keep files of the program in that are no results: where nothing else can be written, a temporary one."""
+"""Folders for files of the program that are no results; a temporary one where the home folder cannot be written."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ log = logging.getLogger(__name__)
 
 @cache
 def temporary_folder() -> Path | None:
-    """A folder of this user's for all runs on this machine; what is kept there is said once in a process.
+    """A temporary folder of this user for what all runs on this machine share; a warning names it once in a process.
 
-    Compiled code is read from it, so a folder that others may write to is not taken: one for this process alone is made
-    instead. None where there is no temporary folder either.
+    Compiled code is read from it. So a folder that others may write to is not taken, and one for this process alone is
+    made instead. None where there is no temporary folder either.
     """
     owner = os.getuid() if hasattr(os, "getuid") else 0
     try:

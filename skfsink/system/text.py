@@ -1,6 +1,6 @@
 """Text files as people's programs write them: with a byte order mark, in UTF-16, with the line ends of Windows.
 
-What is wrong in a TOML file is said with its cure where it is one of the usual things.
+Usual mistakes in a TOML file are reported with their cure.
 """
 
 from __future__ import annotations
