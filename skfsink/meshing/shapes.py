@@ -88,7 +88,7 @@ def symmetric_double_edge_notch_mesh(*, side: float = 3.0, notch: float = 0.5, n
 
         half = mesh_outline(_left_half(side, notch, notch_width, middle), _even(size, image), seed=seed)
         return completed(half, "seam", image, {"left": "right"})
-    return _double_edge_notched(side, notch, notch_width, 0.0, size, symmetry, seed)
+    return _double_edge_notched(side, notch, notch_width, 0.0, size=size, symmetry=symmetry, seed=seed)
 
 
 def asymmetric_double_edge_notch_mesh(*, side: float = 4.0, notch: float = 0.6, notch_width: float = 0.1,
@@ -106,7 +106,7 @@ def asymmetric_double_edge_notch_mesh(*, side: float = 4.0, notch: float = 0.6, 
     require("half-height", half_height, "mm", low=0, low_open=True)
     fine = (0.0, side, side / 2 - half_height, side / 2 + half_height)
     size = SizeField(h, h_coarse, (fine,), distance=distance)
-    return _double_edge_notched(side, notch, notch_width, offset, size, symmetry, seed)
+    return _double_edge_notched(side, notch, notch_width, offset, size=size, symmetry=symmetry, seed=seed)
 
 
 def dog_bone_mesh(*, length: float = 10.0, gauge_length: float = 4.0, gauge_width: float = 1.5, grip_width: float = 3.0,
@@ -237,7 +237,7 @@ def _edge_notched(side: float, notch: float, width: float, size: SizeField, symm
     return mesh_outline(outline, size, seed=seed)
 
 
-def _double_edge_notched(side: float, notch: float, width: float, offset: float, size: SizeField, symmetry: str,
+def _double_edge_notched(side: float, notch: float, width: float, offset: float, *, size: SizeField, symmetry: str,
                          seed: int) -> meshio.Mesh:
     """Square plate with notches from the left and the right edge, the right one higher by `offset`."""
     left, right = (side - offset) / 2, (side + offset) / 2
