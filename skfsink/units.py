@@ -1,4 +1,4 @@
-"""Quantities with units: what each parameter is measured in, and text such as "5 mm" as a number in that unit.
+"""Quantities with units: the unit of a parameter in its annotation, and text such as "5 mm" as a number in it.
 
 Units are read as they are written: kg/m^3, kg/m**3, kg/m3, kg/m³, kg m^-3, kg·m⁻³, N/(mm^2).
 """
@@ -6,22 +6,14 @@ Units are read as they are written: kg/m^3, kg/m**3, kg/m3, kg/m³, kg m^-3, kg�
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
 from .errors import ParameterError
 
-__all__ = ["UNITS", "in_unit", "number_in"]
+__all__ = ["Unit", "in_unit", "number_in"]
 
-#: unit of each parameter that has one; the other numbers are pure
-UNITS = {
-    **dict.fromkeys(("side", "notch", "notch_width", "offset", "length", "gauge_length", "gauge_width", "grip_width",
-                     "fillet", "thickness", "inner_radius", "length_scale", "merge_nodes"), "mm"),
-    **dict.fromkeys(("c1", "c2", "bulk_modulus", "phi"), "MPa"),
-    "density": "kg/m^3",
-    "speed": "mm/s",
-    **dict.fromkeys(("event_time", "aftermath", "hht_dt", "record_every", "frame_every", "checkpoint_every"), "s"),
-}
 LONGEST = 80  # characters of a quantity
 #: characters as they are typeset, and as they are typed
 TYPED = str.maketrans({"\u03bc": "µ", "−": "-", "–": "-", "·": "*", "⋅": "*", "×": "*", "°": "degree",
@@ -36,6 +28,13 @@ QUANTITY = re.compile(rf"\s*(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{{1
                       rf"(?:\s*[*x]\s*10(?:\^|\*\*)(?P<ten>[+-]?\d{{1,2}}))?"
                       rf"\s*(?P<unit>(?:{_TERM}(?:(?:\s*[*/]\s*|\s+){_TERM})*)?)\s*", re.ASCII)
 COMMA = re.compile(r"\s*[+-]?\d[\d.]*,\d")  # of a decimal number, or between thousands
+
+
+@dataclass(frozen=True)
+class Unit:
+    """What a parameter is measured in, as part of its annotation: `side: Annotated[float, Unit("mm")]`."""
+
+    symbol: str
 
 
 @cache

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
-import inspect
 import sys
 from pathlib import Path
 from typing import Any
@@ -16,8 +14,8 @@ from skfsink.results.history import History
 from skfsink.results.series import Series
 from skfsink.results.summary import write_summary
 from skfsink.scene.options import Options
+from skfsink.scene.registry import find_case
 from skfsink.scene.scene import Scene
-from skfsink.system.files import write_atomic
 
 FIGURES = Path(__file__).resolve().parents[1] / "figures"
 if str(FIGURES) not in sys.path:
@@ -29,11 +27,8 @@ STEP = 5e-6                             # between the frames [s]
 
 def scene_of(case: str, analysis: str = "dynamic", **dimensions: Any) -> Scene:
     """The scene of a case on its coarse mesh."""
-    module = importlib.import_module(f"skfsink.cases.{case}")
-    own = {name: parameter.default for name, parameter in inspect.signature(getattr(module, case)).parameters.items()
-           if name != "options"}
-    scene: Scene = module._scene({**own, "mesh": "coarse", **dimensions}, Options(analysis=analysis))
-    return scene
+    found = find_case(case)
+    return found.scene({**found.default_arguments, "mesh": "coarse", **dimensions}, Options(analysis=analysis))
 
 
 def cracked(scene: Scene, tip: float, time: float = 1e-5, opening: float = 0.05) -> Frame:
@@ -80,7 +75,7 @@ def write_run(folder: Path, scene: Scene) -> Path:
         "energy": {"U_paper_at_arrival": 0.06 * share, "U_paper_final": 0.065 * share,
                    "D_sink_at_arrival": 0.03 * share, "D_sink_final": 0.031 * share, "D_sink_kinetic": 0.01 * share},
         "moments": {k: v for k, v in MOMENTS.items() if not (quasistatic and k == "branching")}})
-    write_atomic(folder / "scene.toml", scene.toml())
+    scene.stored().write(folder)
     return folder
 
 

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from references import scene_of
 
+import skfsink.run.request
 import skfsink.run.run
 from skfsink.cases.single_edge_notch import single_edge_notch
 from skfsink.errors import MeshError, OutputError
@@ -25,6 +26,7 @@ from skfsink.run.display import Display
 from skfsink.run.notes import Notes
 from skfsink.run.two_pass import Corridor, corridor_report, lay_corridor
 from skfsink.scene.options import Options
+from skfsink.scene.registry import read_scene
 
 L = 0.1
 
@@ -94,7 +96,7 @@ def test_a_crack_that_leaves_the_corridor_is_counted_and_warned_of(tmp_path: Pat
 
 def test_without_gmsh_the_committed_mesh_is_taken_and_said_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if the fall-back is silent, or is stored as what it is not."""
-    monkeypatch.setattr(skfsink.run.run, "has_gmsh", lambda: False)
+    monkeypatch.setattr(skfsink.run.request, "has_gmsh", lambda: False)
     monkeypatch.setattr(skfsink.run.run, "draw_run", lambda *_: None)
     options = Options(mesh_layout="two-pass", event_time=1e-7, out=tmp_path / "run", quiet=True)
     result = single_edge_notch(mesh="coarse", options=options)
@@ -119,12 +121,12 @@ def test_the_mesh_of_two_passes_comes_from_the_folder(tmp_path: Path, monkeypatc
     scene = scene_of("single_edge_notch")
     monkeypatch.setattr(corridor, "first_pass", lambda *_: (straight(), {"elements": 900, "wall_s": 1.0}))
     options = lay_corridor(scene, scene.parameters, Options(mesh_layout="two-pass"), tmp_path, Display(quiet=True))
-    from skfsink.cases.single_edge_notch import _scene
+    from skfsink.cases.single_edge_notch import CASE
 
     own = {k: v for k, v in scene.parameters.items() if k in ("side", "notch", "notch_width", "mesh", "mesh_seed")}
-    made = _scene(own, options)
-    (tmp_path / "scene.toml").write_text(made.toml())
-    again = skfsink.scene.stored.read_scene(tmp_path)
+    made = CASE.scene(own, options)
+    made.stored().write(tmp_path)
+    again = read_scene(tmp_path)
     assert again.fingerprint == made.fingerprint and made.sample.space.n_elements < 0.8 * 2993
     with pytest.raises(MeshError, match="no mesh of a corridor"):
-        _scene(own, replace(options, corridor=tmp_path / "gone.vtu"))
+        CASE.scene(own, replace(options, corridor=tmp_path / "gone.vtu"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -17,9 +18,9 @@ from skfsink.errors import OutputError, ParameterError, SkfsinkError
 from skfsink.meshing.vtu import write_mesh
 from skfsink.results.loader import load
 from skfsink.scene.deck import read_deck
-from skfsink.scene.registry import CASES, parameters_of
-from skfsink.scene.stored import read_parameters, stored_case
-from skfsink.units import UNITS, in_unit
+from skfsink.scene.registry import CASES, find_case, find_case_of_run
+from skfsink.scene.stored import StoredScene
+from skfsink.units import in_unit
 
 REFERENCES = sorted((Path(__file__).resolve().parents[1] / "cases").glob("*/reference/*/scene.toml"))
 
@@ -78,23 +79,13 @@ def test_what_is_no_quantity(text: str, unit: str, said: str) -> None:
 @pytest.mark.parametrize("case", CASES)
 def test_every_length_time_and_stress_has_a_unit(case: str) -> None:
     """Fails if a parameter whose help names a unit has none in a deck, or another one."""
-    named = dict.fromkeys(UNITS)
-    lines = deck_text(case).splitlines()
-    comment = ""
-    for line in lines:
-        if line.startswith("#"):
-            comment += line
-        elif " = " in line:
-            name = line.split(" = ")[0]
-            unit = UNITS.get(name)
-            if unit and name != "case":
-                assert f"[{unit}]" in comment, (name, comment)
-                named[name] = unit
-            else:
-                assert not any(f"[{u}]" in comment for u in UNITS.values()), (name, comment)
-            comment = ""
-        else:
-            comment = ""
+    for name, parameter in find_case(case).parameters.items():
+        said = re.findall(r"\[([A-Za-z/^0-9]*[A-Za-z][A-Za-z/^0-9]*)\]", parameter.meaning)
+        assert said == ([parameter.unit] if parameter.unit else []), (name, parameter)
+    deck = deck_text(case)
+    for name, unit in (("length_scale", "mm"), ("density", "kg/m^3"), ("speed", "mm/s"), ("phi", "MPa"),
+                       ("hht_dt", "s")):
+        assert re.search(rf'(?m)^{name} = ".* {re.escape(unit)}"$', deck), name
 
 
 # --- reading ---
@@ -103,7 +94,7 @@ def test_the_deck_that_is_shown_has_the_defaults(case: str, tmp_path: Path) -> N
     """Fails if `show` leaves a parameter out, or its text does not read back."""
     read = read_deck(deck(tmp_path, deck_text(case)))
     assert read.case == case
-    assert dict(read.parameters) == parameters_of(case)
+    assert dict(read.parameters) == find_case(case).defaults
 
 
 @pytest.mark.parametrize("path", REFERENCES, ids=lambda path: "-".join(path.parts[-4:-1:2]))
@@ -113,7 +104,7 @@ def test_the_scene_of_a_run_is_a_deck(path: Path) -> None:
     assert read.case == written["case"]
     for name, value in written["parameters"].items():
         assert read.parameters[name] == value
-    assert stored_case(path.parent) == read.case
+    assert StoredScene.read(path.parent).case == read.case
 
 
 def test_a_mesh_file_is_sought_from_the_folder_of_the_deck(tmp_path: Path) -> None:
@@ -146,10 +137,10 @@ def test_what_is_no_deck(text: str, said: str, tmp_path: Path) -> None:
 def test_no_run_to_resume(tmp_path: Path) -> None:
     """Fails if a folder without a run, or with a foreign scene, is not refused."""
     with pytest.raises(OutputError, match="holds no run"):
-        stored_case(tmp_path)
-    (tmp_path / "scene.toml").write_text('case = "../../etc"\n')
-    with pytest.raises(OutputError, match="its case is"):
-        stored_case(tmp_path)
+        StoredScene.read(tmp_path)
+    (tmp_path / "scene.toml").write_text('case = "../../etc"\n[parameters]\n')
+    with pytest.raises(OutputError, match=r"scene\.toml is not the scene of a run: its case is '\.\./\.\./etc'"):
+        find_case_of_run(StoredScene.read(tmp_path), tmp_path)
 
 
 # --- files of other programs ---
@@ -165,8 +156,8 @@ def test_encodings_and_line_ends(encoding: str, end: str, tmp_path: Path) -> Non
     for name in ("deck.toml", "scene.toml"):
         (tmp_path / name).write_bytes(mark + content)
     assert read_deck(tmp_path / "deck.toml").parameters == {"side": 5.0, "mesh": str(tmp_path / "plate.vtu")}
-    assert stored_case(tmp_path) == "single_edge_notch" == load(tmp_path).case
-    assert read_parameters(tmp_path, "single_edge_notch")["side"] == "5 mm"
+    assert StoredScene.read(tmp_path).case == "single_edge_notch" == load(tmp_path).case
+    assert StoredScene.read(tmp_path).parameters["side"] == "5 mm"
 
 
 @pytest.mark.parametrize(("content", "said"), [
@@ -234,7 +225,7 @@ ODD = settings(max_examples=300, deadline=None, database=None,
                suppress_health_check=[HealthCheck.function_scoped_fixture])
 MANY = settings(ODD, max_examples=5000)
 BYTES = st.binary(max_size=300)
-TABLES = st.dictionaries(st.sampled_from([*parameters_of("dog_bone"), "x", ""]), VALUES, max_size=8)
+TABLES = st.dictionaries(st.sampled_from([*find_case("dog_bone").parameters, "x", ""]), VALUES, max_size=8)
 
 
 def check_bytes(tmp_path: Path, content: bytes) -> None:

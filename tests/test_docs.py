@@ -22,7 +22,7 @@ from skfsink.meshing.vtu import write_mesh
 from skfsink.methods.controls import StaticsControls
 from skfsink.methods.statics import Statics
 from skfsink.scene.options import Options
-from skfsink.scene.registry import CASES, case_function, parameters_of
+from skfsink.scene.registry import CASES, find_case
 from skfsink.sweep.vary import read_variation
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -106,7 +106,7 @@ def said_of(line: str, capsys: pytest.CaptureFixture[str]) -> str:
     if case == "NAME":
         case = CASES[0]
     with pytest.raises(SystemExit) as end:
-        command(case_function(case), ["--help"])
+        command(find_case(case).function, ["--help"])
     assert end.value.code == 0
     return capsys.readouterr().out
 
@@ -124,7 +124,7 @@ def test_commands_are_understood(line: str, capsys: pytest.CaptureFixture[str], 
     help_ = said_of(line, capsys)
     for option, value in zip(words, [*words[1:], ""]):
         assert not option.startswith("--") or re.search(rf"{option}\b", help_), option
-        assert option != "--vary" or read_variation(value, parameters_of("single_edge_notch"))
+        assert option != "--vary" or read_variation(value, find_case("single_edge_notch").parameters)
 
 
 # --- messages ---

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
-import inspect
 import json
 import tomllib
 from dataclasses import replace
@@ -18,7 +16,7 @@ from plates import invoke, plate
 from references import scene_of
 
 import skfsink.run.run
-from skfsink.cases.single_edge_notch import _scene, single_edge_notch
+from skfsink.cases.single_edge_notch import CASE
 from skfsink.errors import Interrupted, MeshError, OutputError, ParameterError
 from skfsink.fields.crack import CRACKED
 from skfsink.fields.density import DensitySolver
@@ -37,20 +35,18 @@ from skfsink.run.model import LADDERS, REFERENCE, Ladder, choose_model, level
 from skfsink.run.quantities import measured, relative_error
 from skfsink.run.simulate import Simulation
 from skfsink.scene.options import QUANTITIES, Options
+from skfsink.scene.registry import find_case, read_scene
 from skfsink.scene.scene import Scene
-from skfsink.scene.stored import read_scene
 from skfsink.system.shipped import data_folder
 
 HALVES = ("single_edge_notch", "symmetric_double_edge_notch", "dog_bone", "cylindrical_shell")
-OWN = {name: p.default for name, p in inspect.signature(single_edge_notch).parameters.items() if name != "options"}
+OWN = CASE.default_arguments
 
 
 def with_options(case: str, mesh: str = "coarse", **options: Any) -> Any:
     """The scene of a case with other options."""
-    module = importlib.import_module(f"skfsink.cases.{case}")
-    own = {name: p.default for name, p in inspect.signature(getattr(module, case)).parameters.items()
-           if name != "options"}
-    return module._scene({**own, "mesh": mesh}, Options(**options))
+    found = find_case(case)
+    return found.scene({**found.default_arguments, "mesh": mesh}, Options(**options))
 
 
 # --- halves ---
@@ -142,7 +138,7 @@ def test_dimensions_that_a_sample_does_not_have() -> None:
 def small(folder: Path, start: str) -> Scene:
     """The small plate, with elements of l/2."""
     write_mesh(folder / "plate.vtu", plate())
-    return _scene({**OWN, "mesh": str(folder / "plate.vtu")}, Options(
+    return CASE.scene({**OWN, "mesh": str(folder / "plate.vtu")}, Options(
         length_scale=0.6, start=start, event_time=2e-5, overshoot=1e-3))
 
 
@@ -233,7 +229,7 @@ def test_options_against_the_model_are_refused() -> None:
     with pytest.raises(ParameterError, match="--analysis both is not that of the model statics-half"):
         model.apply(Options(analysis="both"))
     with pytest.raises(ParameterError, match="--active-zone True"):
-        level("single_edge_notch", "dynamics-everywhere").apply(Options(given=frozenset({"active_zone"})))
+        level("single_edge_notch", "dynamics-everywhere").apply(Options(given_names=frozenset({"active_zone"})))
 
 
 def point(price: float, u: float | None, speed: float | None, made: bool = False, **more: Any) -> dict[str, Any]:
@@ -273,7 +269,7 @@ def test_the_cheapest_within_the_tolerance_is_taken(ladder: Path, quantity: str,
 def test_the_choice_says_what_it_is_from(ladder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if price, error, the refused model, or parameters that were not measured are left out of the message."""
     monkeypatch.setattr(models, "has_gmsh", lambda: False)
-    options, choice = choose_model("single_edge_notch", {**OWN, "side": 5.0}, OWN, Options(model="auto", phi=0.2))
+    options, choice = choose_model(CASE, {**OWN, "side": 5.0}, Options(model="auto", phi=0.2))
     assert (options.model, options.half, choice["model"], choice["asked"]) == (
         "dynamics-half", True, "dynamics-half", "auto")
     assert choice["error"] == pytest.approx(0.03) and choice["price_s"] == 10.0 and choice["processor"] == "abacus"
@@ -282,7 +278,7 @@ def test_the_choice_says_what_it_is_from(ladder: Path, monkeypatch: pytest.Monke
     for part in ("model dynamics-half", "U off by 3.0% (tolerance 5.0%)", "10.0 s", "mesh M3", "next cheaper",
                  "measured at default parameters; here side, phi differ"):
         assert part in choice["text"]
-    _, choice = choose_model("single_edge_notch", OWN, OWN, Options(model="statics"))
+    _, choice = choose_model(CASE, OWN, Options(model="statics"))
     assert "tolerance" not in choice and "changed" not in choice and choice["error"] == pytest.approx(0.6)
 
 
@@ -291,8 +287,8 @@ def test_ladders_that_cannot_be_used(tmp_path: Path, monkeypatch: pytest.MonkeyP
     path = tmp_path / "ladder.json"
     monkeypatch.setattr(models, "ladder_path", lambda case: path)
     with pytest.raises(OutputError, match="were not measured"):
-        choose_model("single_edge_notch", OWN, OWN, Options(model="auto"))
-    assert choose_model("single_edge_notch", OWN, OWN, Options(model="statics"))[1]["model"] == "statics"
+        choose_model(CASE, OWN, Options(model="auto"))
+    assert choose_model(CASE, OWN, Options(model="statics"))[1]["model"] == "statics"
     for text in ("", "{}", '{"points": {}, "machine": {}}', '{"points": 3}'):
         path.write_text(text)
         with pytest.raises(OutputError, match="is no measured ladder"):

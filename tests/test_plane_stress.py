@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from skfsink.cases.cylindrical_shell import cylindrical_shell
-from skfsink.cases.dog_bone import _scene as dog_bone_scene
+from skfsink.cases.dog_bone import CASE as DOG_BONE
 from skfsink.cases.dog_bone import dog_bone
 from skfsink.errors import ParameterError
 from skfsink.fem import kernels
@@ -318,7 +318,7 @@ def test_dog_bone_as_a_sheet_starts_to_crack_where_the_solid_does(tmp_path):
     """Fails if the section is not computed alone, or if onset and load differ from the committed ones of the solid."""
     case = reference.load_coarse("dog_bone")["dynamic"]
     own = {name: p.default for name, p in inspect.signature(dog_bone).parameters.items() if name != "options"}
-    scene = dog_bone_scene(own, Options(element="planestress"))
+    scene = DOG_BONE.scene(own, Options(element="planestress"))
     assert scene.sample.space.n_elements * own["layers"] == case["elements"]
     body = Simulation(scene, tmp_path, Display(True))
     for _ in body.statics.load(body.state):

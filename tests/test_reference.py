@@ -15,7 +15,7 @@ from skfsink.results import reference
 from skfsink.results.frame import SPENT, read_frame
 from skfsink.results.history import History
 from skfsink.results.packing import DISPLACEMENT_STEP, GAMMA_STEP, VELOCITY_STEPS, Packer
-from skfsink.scene.stored import read_scene
+from skfsink.scene.registry import read_scene
 from skfsink.system.shipped import data_folder
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -67,7 +67,7 @@ def test_what_is_stored_comes_back(runs: Path, home: Path, case: str, run: str) 
             assert frame.v is None
     assert found.frame("absent", "end") is found.frames["end"]
     assert found.summary == json.loads((runs / run / "summary.json").read_text())
-    assert found.scene.toml() == read_scene(runs / run).toml() == (target / "scene.toml").read_text()
+    assert found.scene.stored().toml() == read_scene(runs / run).stored().toml() == (target / "scene.toml").read_text()
     history = History.load(runs / run / "history.csv")
     for name, values in history.items():
         if values.dtype.kind == "f":

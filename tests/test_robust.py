@@ -28,7 +28,7 @@ from skfsink.run.checkpoint import load_checkpoint
 from skfsink.run.display import Interrupt
 from skfsink.run.memory import LIMIT, available, estimate, factor_entries
 from skfsink.run.observers.observer import Observers
-from skfsink.scene.stored import read_scene
+from skfsink.scene.registry import read_scene
 
 REFERENCES = sorted((Path(__file__).resolve().parents[1] / "cases").glob("*/reference/*/summary.json"))
 

@@ -21,7 +21,7 @@ from skfsink.meshing.sample import file_sample
 from skfsink.meshing.vtu import write_mesh
 from skfsink.results.result import Result
 from skfsink.scene.deck import read_deck
-from skfsink.scene.registry import CASES, parameters_of
+from skfsink.scene.registry import CASES, find_case
 from skfsink.sweep import plan
 from skfsink.sweep.one import run_folder
 from skfsink.system import shipped
@@ -60,7 +60,7 @@ def one_by_one(folders: Sequence[Path], jobs: int) -> Iterator[Path]:
 @pytest.mark.parametrize("case", [case for case in CASES if case != "custom"])
 def test_the_deck_of_a_case_has_its_defaults(case: str) -> None:
     """Fails if the deck of a scene of the paper is not that scene, computed both ways, or says another default."""
-    deck, known = read_deck(shipped_decks()[case]), parameters_of(case)
+    deck, known = read_deck(shipped_decks()[case]), find_case(case).defaults
     assert deck.case == case and deck.parameters["analysis"] == "both"
     for name, value in deck.parameters.items():
         assert value == (0.1686 if name == "phi" else "both" if name == "analysis" else known[name]), name

@@ -25,13 +25,13 @@ from skfsink.errors import OutputError, ParameterError
 from skfsink.meshing.vtu import write_mesh
 from skfsink.results.history import History
 from skfsink.scene.deck import read_deck
-from skfsink.scene.registry import parameters_of
+from skfsink.scene.registry import find_case
 from skfsink.sweep.one import run_folder
 from skfsink.sweep.plan import run_sweep
 from skfsink.sweep.table import draw, read_rows, read_units, write_csv, write_parquet
 from skfsink.sweep.vary import combinations, read_variation
 
-KNOWN = parameters_of("single_edge_notch")
+KNOWN = find_case("single_edge_notch").parameters
 
 
 @pytest.fixture
@@ -55,7 +55,7 @@ def test_variations(text: str, name: str, values: list[object]) -> None:
     """Fails if a range, a list or a unit is read otherwise than documented, or whole numbers become others."""
     found, read = read_variation(text, KNOWN)
     assert (found, read) == (name, pytest.approx(values) if isinstance(values[0], float) else values)
-    assert not isinstance(KNOWN[name], int) or all(isinstance(value, int) for value in read)
+    assert KNOWN[name].kind is not int or all(isinstance(value, int) for value in read)
 
 
 @pytest.mark.parametrize(("text", "said"), [

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import inspect
 import sys
 import textwrap
 from collections.abc import Iterator
 from pathlib import Path
 
-from docstring_parser import parse
-
 from skfsink.results.history import onset_load
 from skfsink.results.loader import Run, load
-from skfsink.scene.registry import case_function
+from skfsink.scene.registry import find_case
 from skfsink.system.shipped import data_folder
-from skfsink.units import UNITS
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "figures"))
@@ -38,23 +34,19 @@ def page() -> str:
     return HEAD + "".join(f"\n{line}" for case in CASES for line in _scene(case)) + "\n"
 
 
-def _scene(case: str) -> Iterator[str]:
-    function = case_function(case)
-    doc = parse(function.__doc__ or "")
-    runs = [load(data_folder(case) / "reference" / run.key) for run in RUNS if run.case == case and run.key != "coarse"]
+def _scene(name: str) -> Iterator[str]:
+    case = find_case(name)
+    runs = [load(data_folder(name) / "reference" / run.key) for run in RUNS if run.case == name and run.key != "coarse"]
     title = runs[0].scene.title
     yield f"## {title}\n"
-    yield textwrap.fill(" ".join(f"{doc.short_description} {doc.long_description or ''}".split()), 120) + "\n"
-    figure = next(name for name, needs in FIGURES.items() if any(need.startswith(f"{case}/") for need in needs))
+    yield textwrap.fill(case.description, 120) + "\n"
+    figure = next(key for key, needs in FIGURES.items() if any(need.startswith(f"{name}/") for need in needs))
     yield f"![{title}](../figures/{figure}.png)\n"
-    yield f"```bash\npython -m skfsink.cases.{case} --mesh coarse --analysis both\n```\n"
+    yield f"```bash\npython -m skfsink.cases.{name} --mesh coarse --analysis both\n```\n"
     yield "| parameter | default | meaning |\n|---|---|---|"
-    defaults = inspect.signature(function).parameters
-    for item in doc.params:
-        if item.arg_name != "options":
-            default = f"{defaults[item.arg_name].default} {UNITS.get(item.arg_name, '')}".strip()
-            meaning = " ".join((item.description or "").split()).replace("<", "&lt;")
-            yield f"| `{item.arg_name}` | {default} | {meaning} |"
+    for parameter in case.arguments:
+        default = f"{parameter.default} {parameter.unit}".strip()
+        yield f"| `{parameter.name}` | {default} | {parameter.meaning.replace('<', '&lt;')} |"
     units = runs[0].history.units
     force, work = units["reaction_N_per_mm"], units["elastic"]
     yield (f"\n| reference | elements | onset at (mm) | load ({force}) | $U$ ({work}) | $D$ ({work}) | arrival | "

@@ -10,8 +10,10 @@ from ..meshing.shapes import check_two_notches
 from ..results.result import Result
 from ..run.run import run_case
 from ..scene.arrange import arrange
+from ..scene.case import Case
 from ..scene.options import SAMPLE, Options
 from ..scene.scene import Scene
+from ..units import Unit
 
 __all__ = ["asymmetric_double_edge_notch"]
 
@@ -24,11 +26,16 @@ ASSUMED = (
 )
 
 
-def asymmetric_double_edge_notch(*, side: Annotated[float, SAMPLE] = 4.0, notch: Annotated[float, SAMPLE] = 0.6,
-                                 notch_width: Annotated[float, SAMPLE] = 0.1,
-                                 offset: Annotated[float, SAMPLE] = 1.0, mesh: Annotated[str, SAMPLE] = "M3",
-                                 mesh_seed: Annotated[int, SAMPLE] = 0,
-                                 options: Options = Options()) -> Result:  # noqa: B008
+def asymmetric_double_edge_notch(
+        *,
+        side: Annotated[float, SAMPLE, Unit("mm")] = 4.0,
+        notch: Annotated[float, SAMPLE, Unit("mm")] = 0.6,
+        notch_width: Annotated[float, SAMPLE, Unit("mm")] = 0.1,
+        offset: Annotated[float, SAMPLE, Unit("mm")] = 1.0,
+        mesh: Annotated[str, SAMPLE] = "M3",
+        mesh_seed: Annotated[int, SAMPLE] = 0,
+        options: Options = Options(),  # noqa: B008
+) -> Result:
     """Pull a square plate with a low notch on its left and a high one on its right apart, and watch the cracks.
 
     The grips at the top and bottom edge move apart at `speed` each and hold the plate sideways. The plate is loaded
@@ -56,24 +63,26 @@ def asymmetric_double_edge_notch(*, side: Annotated[float, SAMPLE] = 4.0, notch:
     Result
         Summary, history and last state; its files are in the output folder.
     """
-    own = {"side": side, "notch": notch, "notch_width": notch_width, "offset": offset, "mesh": mesh,
+    arguments = {"side": side, "notch": notch, "notch_width": notch_width, "offset": offset, "mesh": mesh,
            "mesh_seed": mesh_seed}
-    return run_case(asymmetric_double_edge_notch, _scene, own, options)
+    return run_case(CASE, arguments, options)
 
 
-def _scene(own: dict[str, Any], options: Options) -> Scene:
-    side, notch, width = own["side"], own["notch"], own["notch_width"]
+def _scene(arguments: dict[str, Any], options: Options) -> Scene:
+    side, notch, width = arguments["side"], arguments["notch"], arguments["notch_width"]
     check_two_notches(side, notch, width)
-    require("offset", own["offset"], "mm", low=0, high=side - 2 * width, high_open=True)
+    require("offset", arguments["offset"], "mm", low=0, high=side - 2 * width, high_open=True)
     speed = options.speed
     return Scene(
         case="asymmetric_double_edge_notch", title="Asymmetric double-edge notched plate",
-        parameters={**own, **options.parameters()}, material=options.stored_energy(), sink_law=options.sink_law(),
+        parameters={**arguments, **options.parameters()}, material=options.stored_energy(), sink_law=options.sink_law(),
         controls=options.controls(), assumed=ASSUMED,
-        **arrange("asymmetric_double_edge_notch", own, options,
+        **arrange("asymmetric_double_edge_notch", arguments, options,
                   (Grip("top", (0.0, speed)), Grip("bottom", (0.0, -speed))),
                   asymmetry="it is symmetric by half a turn, which no boundary can hold"))
 
+
+CASE = Case(asymmetric_double_edge_notch, _scene)
 
 if __name__ == "__main__":
     from ..cli.program import command

@@ -14,21 +14,28 @@ from ..material.regions import Region, RegionLaw
 from ..meshing.sample import file_sample
 from ..results.result import Result
 from ..run.run import run_case
+from ..scene.case import Case
 from ..scene.options import SAMPLE, Options
 from ..scene.scene import Scene
 from ..scene.tables import TABLES, grip_from, grips_of, read_tables, region_from, traction_from, tractions_of
+from ..units import Unit
 
 __all__ = ["custom"]
 
 IN_A_DECK = Parameter(parse=False)
 
 
-def custom(*, mesh: Annotated[str, SAMPLE] = "", title: Annotated[str, SAMPLE] = "Custom scene",
-           faces: Annotated[str, SAMPLE] = "", merge_nodes: Annotated[float, SAMPLE] = 0.0,
-           grips: Annotated[Sequence[Grip | Mapping[str, Any]], IN_A_DECK] = (),
-           tractions: Annotated[Sequence[Traction | Mapping[str, Any]], IN_A_DECK] = (),
-           regions: Annotated[Sequence[RegionLaw | Mapping[str, Any]], IN_A_DECK] = (),
-           options: Options = Options()) -> Result:  # noqa: B008
+def custom(
+        *,
+        mesh: Annotated[str, SAMPLE] = "",
+        title: Annotated[str, SAMPLE] = "Custom scene",
+        faces: Annotated[str, SAMPLE] = "",
+        merge_nodes: Annotated[float, SAMPLE, Unit("mm")] = 0.0,
+        grips: Annotated[Sequence[Grip | Mapping[str, Any]], IN_A_DECK] = (),
+        tractions: Annotated[Sequence[Traction | Mapping[str, Any]], IN_A_DECK] = (),
+        regions: Annotated[Sequence[RegionLaw | Mapping[str, Any]], IN_A_DECK] = (),
+        options: Options = Options(),  # noqa: B008
+) -> Result:
     """Load a body of one's own until it fails, and watch the crack.
 
     The body is the mesh; named boundaries of it are grips, or carry tractions. Boundaries that the mesh does not name
@@ -63,36 +70,37 @@ def custom(*, mesh: Annotated[str, SAMPLE] = "", title: Annotated[str, SAMPLE] =
     """
     if options.model:
         raise ParameterError(f"model is for the cases of the paper, whose models were measured; got {options.model!r}")
-    given = {"grips": grips, "tractions": tractions, "regions": regions}
     tables = {name: read_tables(name, [item if isinstance(item, Mapping) else TABLES[name][1](item) for item in items])
-              for name, items in given.items()}
-    own = {"mesh": str(mesh), "title": title, "faces": faces, "merge_nodes": merge_nodes, **tables}
-    return run_case(custom, _scene, own, options)
+              for name, items in (("grips", grips), ("tractions", tractions), ("regions", regions))}
+    arguments = {"mesh": str(mesh), "title": title, "faces": faces, "merge_nodes": merge_nodes, **tables}
+    return run_case(CASE, arguments, options)
 
 
-def _scene(own: dict[str, Any], options: Options) -> Scene:
-    if not Path(own["mesh"]).suffix:
-        raise ParameterError(f"mesh must be the path of a mesh file; got {own['mesh']!r}")
-    if not own["grips"] and not own["tractions"]:
+def _scene(arguments: dict[str, Any], options: Options) -> Scene:
+    if not Path(arguments["mesh"]).suffix:
+        raise ParameterError(f"mesh must be the path of a mesh file; got {arguments['mesh']!r}")
+    if not arguments["grips"] and not arguments["tractions"]:
         raise ParameterError("grips: a scene needs at least one grip or traction; a deck has them as [[grips]]")
     if options.speed != Options.speed:
         raise ParameterError(f"speed is for the cases of the paper; a grip of a custom scene has its own velocity; "
                              f"got {options.speed:g}")
     for name in ("half", "dimensions", "mesh_layout"):
         if getattr(options, name) != getattr(Options, name):
-            raise ParameterError(f"{name} is for the cases of the paper; the mesh file {own['mesh']} is as it is")
-    sample = file_sample(Path(own["mesh"]), own.get("merge_nodes", 0.0))
+            raise ParameterError(f"{name} is for the cases of the paper; the mesh file {arguments['mesh']} is as it is")
+    sample = file_sample(Path(arguments["mesh"]), arguments.get("merge_nodes", 0.0))
     material, sink_law = options.stored_energy(), options.sink_law()
-    laws = [region_from(table) for table in own["regions"]]
+    laws = [region_from(table) for table in arguments["regions"]]
     regions = tuple(Region(law.name, sample.elements(law.name), *law.laws(material, sink_law)) for law in laws)
     dim = sample.space.dim
     return Scene(
-        case="custom", title=own["title"], parameters={**own, **options.parameters()}, sample=sample,
+        case="custom", title=arguments["title"], parameters={**arguments, **options.parameters()}, sample=sample,
         material=material, sink_law=sink_law, controls=options.controls(), regions=regions,
-        grips=grips_of([grip_from(table) for table in own["grips"]], dim),
-        tractions=tractions_of([traction_from(table) for table in own["tractions"]], dim),
-        faces=tuple(filter(None, (name.strip() for name in own["faces"].split(",")))))
+        grips=grips_of([grip_from(table) for table in arguments["grips"]], dim),
+        tractions=tractions_of([traction_from(table) for table in arguments["tractions"]], dim),
+        faces=tuple(filter(None, (name.strip() for name in arguments["faces"].split(",")))))
 
+
+CASE = Case(custom, _scene)
 
 if __name__ == "__main__":
     from ..cli.program import command

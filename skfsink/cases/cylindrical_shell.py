@@ -13,8 +13,10 @@ from ..meshing.symmetry import Mirror
 from ..results.result import Result
 from ..run.run import run_case
 from ..scene.arrange import arrange
+from ..scene.case import Case
 from ..scene.options import SAMPLE, Options
 from ..scene.scene import Scene
+from ..units import Unit
 
 __all__ = ["cylindrical_shell"]
 
@@ -27,11 +29,18 @@ ASSUMED = (
 )
 
 
-def cylindrical_shell(*, inner_radius: Annotated[float, SAMPLE] = 1.9, thickness: Annotated[float, SAMPLE] = 0.1,
-                      length: Annotated[float, SAMPLE] = 5.0, notch: Annotated[float, SAMPLE] = 1.0,
-                      notch_width: Annotated[float, SAMPLE] = 0.1, layers: Annotated[int, SAMPLE] = 2,
-                      mesh: Annotated[str, SAMPLE] = "coarse", mesh_seed: Annotated[int, SAMPLE] = 0,
-                      options: Options = Options()) -> Result:  # noqa: B008
+def cylindrical_shell(
+        *,
+        inner_radius: Annotated[float, SAMPLE, Unit("mm")] = 1.9,
+        thickness: Annotated[float, SAMPLE, Unit("mm")] = 0.1,
+        length: Annotated[float, SAMPLE, Unit("mm")] = 5.0,
+        notch: Annotated[float, SAMPLE, Unit("mm")] = 1.0,
+        notch_width: Annotated[float, SAMPLE, Unit("mm")] = 0.1,
+        layers: Annotated[int, SAMPLE] = 2,
+        mesh: Annotated[str, SAMPLE] = "coarse",
+        mesh_seed: Annotated[int, SAMPLE] = 0,
+        options: Options = Options(),  # noqa: B008
+) -> Result:
     """Pull a half cylinder with a slit along its circumference apart, slowly, and watch the cracks.
 
     The two ends move apart at `speed` each along z and are held in x and y; the straight edges are free. The shell is
@@ -63,25 +72,27 @@ def cylindrical_shell(*, inner_radius: Annotated[float, SAMPLE] = 1.9, thickness
     Result
         Summary, history and last state; its files are in the output folder.
     """
-    own = {"inner_radius": inner_radius, "thickness": thickness, "length": length, "notch": notch,
+    arguments = {"inner_radius": inner_radius, "thickness": thickness, "length": length, "notch": notch,
            "notch_width": notch_width, "layers": layers, "mesh": mesh, "mesh_seed": mesh_seed}
-    return run_case(cylindrical_shell, _scene, own, options)
+    return run_case(CASE, arguments, options)
 
 
-def _scene(own: dict[str, Any], options: Options) -> Scene:
-    radius, thickness = own["inner_radius"], own["thickness"]
-    check_shell(radius, thickness, own["length"], own["notch"], own["notch_width"])
-    require("layers", own["layers"], low=1, high=100, whole=True)
+def _scene(arguments: dict[str, Any], options: Options) -> Scene:
+    radius, thickness = arguments["inner_radius"], arguments["thickness"]
+    check_shell(radius, thickness, arguments["length"], arguments["notch"], arguments["notch_width"])
+    require("layers", arguments["layers"], low=1, high=100, whole=True)
     speed = options.speed
     return Scene(
-        case="cylindrical_shell", title="Cylindrical shell", parameters={**own, **options.parameters()},
+        case="cylindrical_shell", title="Cylindrical shell", parameters={**arguments, **options.parameters()},
         material=options.stored_energy(), sink_law=options.sink_law(), controls=options.controls(), assumed=ASSUMED,
         view=(80.0, 25.0), flat=unrolled(radius, thickness),
-        **arrange("cylindrical_shell", own, options,
+        **arrange("cylindrical_shell", arguments, options,
                   (Grip("top", (0.0, 0.0, speed)), Grip("bottom", (0.0, 0.0, -speed))), faces=("back", "front"),
-                  lift=lambda section: swept(section, thickness, own["layers"], rolled(radius, thickness)),
+                  lift=lambda section: swept(section, thickness, arguments["layers"], rolled(radius, thickness)),
                   mirrors=(Mirror(0, math.pi / 2 * (radius + thickness / 2)),)))
 
+
+CASE = Case(cylindrical_shell, _scene)
 
 if __name__ == "__main__":
     from ..cli.program import command

@@ -15,8 +15,10 @@ from ..meshing.symmetry import Mirror
 from ..results.result import Result
 from ..run.run import run_case
 from ..scene.arrange import arrange
+from ..scene.case import Case
 from ..scene.options import SAMPLE, Options
 from ..scene.scene import Scene
+from ..units import Unit
 
 __all__ = ["dog_bone"]
 
@@ -28,11 +30,19 @@ ASSUMED = (
 )
 
 
-def dog_bone(*, length: Annotated[float, SAMPLE] = 10.0, gauge_length: Annotated[float, SAMPLE] = 4.0,
-             gauge_width: Annotated[float, SAMPLE] = 1.5, grip_width: Annotated[float, SAMPLE] = 3.0,
-             fillet: Annotated[float, SAMPLE] = 0.75, thickness: Annotated[float, SAMPLE] = 0.2,
-             layers: Annotated[int, SAMPLE] = 2, mesh: Annotated[str, SAMPLE] = "coarse",
-             mesh_seed: Annotated[int, SAMPLE] = 0, options: Options = Options()) -> Result:  # noqa: B008
+def dog_bone(
+        *,
+        length: Annotated[float, SAMPLE, Unit("mm")] = 10.0,
+        gauge_length: Annotated[float, SAMPLE, Unit("mm")] = 4.0,
+        gauge_width: Annotated[float, SAMPLE, Unit("mm")] = 1.5,
+        grip_width: Annotated[float, SAMPLE, Unit("mm")] = 3.0,
+        fillet: Annotated[float, SAMPLE, Unit("mm")] = 0.75,
+        thickness: Annotated[float, SAMPLE, Unit("mm")] = 0.2,
+        layers: Annotated[int, SAMPLE] = 2,
+        mesh: Annotated[str, SAMPLE] = "coarse",
+        mesh_seed: Annotated[int, SAMPLE] = 0,
+        options: Options = Options(),  # noqa: B008
+) -> Result:
     """Pull a dog-bone apart, slowly, and watch the cracks.
 
     The ends move apart at `speed` each along y and hold the sample in x and z. It is loaded statically to the onset of
@@ -68,25 +78,28 @@ def dog_bone(*, length: Annotated[float, SAMPLE] = 10.0, gauge_length: Annotated
     Result
         Summary, history and last state; its files are in the output folder.
     """
-    own = {"length": length, "gauge_length": gauge_length, "gauge_width": gauge_width, "grip_width": grip_width,
+    arguments = {"length": length, "gauge_length": gauge_length, "gauge_width": gauge_width, "grip_width": grip_width,
            "fillet": fillet, "thickness": thickness, "layers": layers, "mesh": mesh, "mesh_seed": mesh_seed}
-    return run_case(dog_bone, _scene, own, options)
+    return run_case(CASE, arguments, options)
 
 
-def _scene(own: dict[str, Any], options: Options) -> Scene:
-    check_dog_bone(own["length"], own["gauge_length"], own["gauge_width"], own["grip_width"], own["fillet"])
-    require("thickness", own["thickness"], "mm", low=0, low_open=True)
-    require("layers", own["layers"], low=1, high=100, whole=True)
+def _scene(arguments: dict[str, Any], options: Options) -> Scene:
+    check_dog_bone(*(arguments[name] for name in ("length", "gauge_length", "gauge_width", "grip_width", "fillet")))
+    thickness = require("thickness", arguments["thickness"], "mm", low=0, low_open=True)
+    layers = int(require("layers", arguments["layers"], low=1, high=100, whole=True))
     speed, plane = options.speed, options.element == "planestress"
     along, back = ((0.0, v) if plane else (0.0, v, 0.0) for v in (speed, -speed))
     return Scene(
-        case="dog_bone", title="Dog-bone", parameters={**own, **options.parameters()}, material=options.stored_energy(),
-        sink_law=options.sink_law(), controls=options.controls(), assumed=ASSUMED, view=(-90.0, 70.0),
-        **arrange("dog_bone", own, options, (Grip("top", along), Grip("bottom", back)),
-                  lift=None if plane else lambda section: swept(section, own["thickness"], own["layers"]),
+        case="dog_bone", title="Dog-bone", parameters={**arguments, **options.parameters()},
+        material=options.stored_energy(), sink_law=options.sink_law(), controls=options.controls(), assumed=ASSUMED,
+        view=(-90.0, 70.0),
+        **arrange("dog_bone", arguments, options, (Grip("top", along), Grip("bottom", back)),
+                  lift=None if plane else lambda section: swept(section, thickness, layers),
                   faces=() if plane else ("back", "front"), mirrors=(Mirror(0, 0.0), Mirror(1, 0.0)),
-                  thickness=own["thickness"] if plane else 1.0))
+                  thickness=thickness if plane else 1.0))
 
+
+CASE = Case(dog_bone, _scene)
 
 if __name__ == "__main__":
     from ..cli.program import command

@@ -9,9 +9,11 @@ from ..meshing.shapes import check_plate
 from ..results.result import Result
 from ..run.run import run_case
 from ..scene.arrange import arrange
+from ..scene.case import Case
 from ..scene.controls import choose
 from ..scene.options import SAMPLE, Options
 from ..scene.scene import Scene
+from ..units import Unit
 
 __all__ = ["simple_shear"]
 
@@ -24,10 +26,16 @@ ASSUMED = (
 )
 
 
-def simple_shear(*, side: Annotated[float, SAMPLE] = 4.0, notch: Annotated[float, SAMPLE] = 2.0,
-                 notch_width: Annotated[float, SAMPLE] = 0.1, top: Annotated[str, SAMPLE] = "held",
-                 mesh: Annotated[str, SAMPLE] = "M4", mesh_seed: Annotated[int, SAMPLE] = 0,
-                 options: Options = Options()) -> Result:  # noqa: B008
+def simple_shear(
+        *,
+        side: Annotated[float, SAMPLE, Unit("mm")] = 4.0,
+        notch: Annotated[float, SAMPLE, Unit("mm")] = 2.0,
+        notch_width: Annotated[float, SAMPLE, Unit("mm")] = 0.1,
+        top: Annotated[str, SAMPLE] = "held",
+        mesh: Annotated[str, SAMPLE] = "M4",
+        mesh_seed: Annotated[int, SAMPLE] = 0,
+        options: Options = Options(),  # noqa: B008
+) -> Result:
     """Shear a square plate with a notch to its middle, slowly, and watch the crack.
 
     The bottom edge is fixed; the top edge moves to the right at `speed`. The plate is loaded statically to the onset
@@ -56,20 +64,23 @@ def simple_shear(*, side: Annotated[float, SAMPLE] = 4.0, notch: Annotated[float
     Result
         Summary, history and last state; its files are in the output folder.
     """
-    own = {"side": side, "notch": notch, "notch_width": notch_width, "top": top, "mesh": mesh,
+    arguments = {"side": side, "notch": notch, "notch_width": notch_width, "top": top, "mesh": mesh,
            "mesh_seed": mesh_seed}
-    return run_case(simple_shear, _scene, own, options)
+    return run_case(CASE, arguments, options)
 
 
-def _scene(own: dict[str, Any], options: Options) -> Scene:
-    check_plate(own["side"], own["notch"], own["notch_width"])
-    height = None if choose("top", own["top"], ("free", "held")) == "free" else 0.0
+def _scene(arguments: dict[str, Any], options: Options) -> Scene:
+    check_plate(arguments["side"], arguments["notch"], arguments["notch_width"])
+    height = None if choose("top", arguments["top"], ("free", "held")) == "free" else 0.0
     return Scene(
-        case="simple_shear", title="Simple shear", parameters={**own, **options.parameters()},
+        case="simple_shear", title="Simple shear", parameters={**arguments, **options.parameters()},
         material=options.stored_energy(), sink_law=options.sink_law(), controls=options.controls(), assumed=ASSUMED,
-        **arrange("simple_shear", own, options, (Grip("top", (options.speed, height)), Grip("bottom", (0.0, 0.0))),
+        **arrange("simple_shear", arguments, options,
+                  (Grip("top", (options.speed, height)), Grip("bottom", (0.0, 0.0))),
                   asymmetry="its halves are stretched and compressed"))
 
+
+CASE = Case(simple_shear, _scene)
 
 if __name__ == "__main__":
     from ..cli.program import command

@@ -10,8 +10,10 @@ from ..meshing.symmetry import Mirror
 from ..results.result import Result
 from ..run.run import run_case
 from ..scene.arrange import arrange
+from ..scene.case import Case
 from ..scene.options import SAMPLE, Options
 from ..scene.scene import Scene
+from ..units import Unit
 
 __all__ = ["single_edge_notch"]
 
@@ -23,9 +25,15 @@ ASSUMED = (
 )
 
 
-def single_edge_notch(*, side: Annotated[float, SAMPLE] = 4.0, notch: Annotated[float, SAMPLE] = 1.0,
-                      notch_width: Annotated[float, SAMPLE] = 0.1, mesh: Annotated[str, SAMPLE] = "M3",
-                      mesh_seed: Annotated[int, SAMPLE] = 0, options: Options = Options()) -> Result:  # noqa: B008
+def single_edge_notch(
+        *,
+        side: Annotated[float, SAMPLE, Unit("mm")] = 4.0,
+        notch: Annotated[float, SAMPLE, Unit("mm")] = 1.0,
+        notch_width: Annotated[float, SAMPLE, Unit("mm")] = 0.1,
+        mesh: Annotated[str, SAMPLE] = "M3",
+        mesh_seed: Annotated[int, SAMPLE] = 0,
+        options: Options = Options(),  # noqa: B008
+) -> Result:
     """Pull a square plate with an edge notch apart, slowly, and watch the crack.
 
     The grips at the top and bottom edge move apart at `speed` each and hold the plate sideways. The plate is loaded
@@ -52,19 +60,21 @@ def single_edge_notch(*, side: Annotated[float, SAMPLE] = 4.0, notch: Annotated[
     Result
         Summary, history and last state; its files are in the output folder.
     """
-    own = {"side": side, "notch": notch, "notch_width": notch_width, "mesh": mesh, "mesh_seed": mesh_seed}
-    return run_case(single_edge_notch, _scene, own, options)
+    arguments = {"side": side, "notch": notch, "notch_width": notch_width, "mesh": mesh, "mesh_seed": mesh_seed}
+    return run_case(CASE, arguments, options)
 
 
-def _scene(own: dict[str, Any], options: Options) -> Scene:
-    check_plate(own["side"], own["notch"], own["notch_width"])
+def _scene(arguments: dict[str, Any], options: Options) -> Scene:
+    check_plate(arguments["side"], arguments["notch"], arguments["notch_width"])
     speed = options.speed
     return Scene(
-        case="single_edge_notch", title="Single-edge notched plate", parameters={**own, **options.parameters()},
+        case="single_edge_notch", title="Single-edge notched plate", parameters={**arguments, **options.parameters()},
         material=options.stored_energy(), sink_law=options.sink_law(), controls=options.controls(), assumed=ASSUMED,
-        **arrange("single_edge_notch", own, options, (Grip("top", (0.0, speed)), Grip("bottom", (0.0, -speed))),
-                  mirrors=(Mirror(1, own["side"] / 2, along=True),)))
+        **arrange("single_edge_notch", arguments, options, (Grip("top", (0.0, speed)), Grip("bottom", (0.0, -speed))),
+                  mirrors=(Mirror(1, arguments["side"] / 2, along=True),)))
 
+
+CASE = Case(single_edge_notch, _scene)
 
 if __name__ == "__main__":
     from ..cli.program import command

@@ -10,8 +10,10 @@ from ..meshing.symmetry import Mirror
 from ..results.result import Result
 from ..run.run import run_case
 from ..scene.arrange import arrange
+from ..scene.case import Case
 from ..scene.options import SAMPLE, Options
 from ..scene.scene import Scene
+from ..units import Unit
 
 __all__ = ["symmetric_double_edge_notch"]
 
@@ -25,10 +27,15 @@ ASSUMED = (
 )
 
 
-def symmetric_double_edge_notch(*, side: Annotated[float, SAMPLE] = 3.0, notch: Annotated[float, SAMPLE] = 0.5,
-                                notch_width: Annotated[float, SAMPLE] = 0.1, mesh: Annotated[str, SAMPLE] = "M4",
-                                mesh_seed: Annotated[int, SAMPLE] = 0,
-                                options: Options = Options()) -> Result:  # noqa: B008
+def symmetric_double_edge_notch(
+        *,
+        side: Annotated[float, SAMPLE, Unit("mm")] = 3.0,
+        notch: Annotated[float, SAMPLE, Unit("mm")] = 0.5,
+        notch_width: Annotated[float, SAMPLE, Unit("mm")] = 0.1,
+        mesh: Annotated[str, SAMPLE] = "M4",
+        mesh_seed: Annotated[int, SAMPLE] = 0,
+        options: Options = Options(),  # noqa: B008
+) -> Result:
     """Pull a square plate with equal notches from both sides apart, slowly, and watch the cracks.
 
     The grips at the top and bottom edge move apart at `speed` each and hold the plate sideways. The plate is loaded
@@ -55,20 +62,23 @@ def symmetric_double_edge_notch(*, side: Annotated[float, SAMPLE] = 3.0, notch: 
     Result
         Summary, history and last state; its files are in the output folder.
     """
-    own = {"side": side, "notch": notch, "notch_width": notch_width, "mesh": mesh, "mesh_seed": mesh_seed}
-    return run_case(symmetric_double_edge_notch, _scene, own, options)
+    arguments = {"side": side, "notch": notch, "notch_width": notch_width, "mesh": mesh, "mesh_seed": mesh_seed}
+    return run_case(CASE, arguments, options)
 
 
-def _scene(own: dict[str, Any], options: Options) -> Scene:
-    check_two_notches(own["side"], own["notch"], own["notch_width"])
+def _scene(arguments: dict[str, Any], options: Options) -> Scene:
+    check_two_notches(arguments["side"], arguments["notch"], arguments["notch_width"])
     speed = options.speed
     return Scene(
         case="symmetric_double_edge_notch", title="Symmetric double-edge notched plate",
-        parameters={**own, **options.parameters()}, material=options.stored_energy(), sink_law=options.sink_law(),
+        parameters={**arguments, **options.parameters()}, material=options.stored_energy(), sink_law=options.sink_law(),
         controls=options.controls(), assumed=ASSUMED,
-        **arrange("symmetric_double_edge_notch", own, options,
-                  (Grip("top", (0.0, speed)), Grip("bottom", (0.0, -speed))), mirrors=(Mirror(0, own["side"] / 2),)))
+        **arrange("symmetric_double_edge_notch", arguments, options,
+                  (Grip("top", (0.0, speed)), Grip("bottom", (0.0, -speed))),
+                  mirrors=(Mirror(0, arguments["side"] / 2),)))
 
+
+CASE = Case(symmetric_double_edge_notch, _scene)
 
 if __name__ == "__main__":
     from ..cli.program import command

@@ -7,21 +7,18 @@ __all__ = ["list_cases"]
 
 def list_cases() -> None:
     """List the cases and the decks of other scenes, with what they are and their meshes."""
-    from docstring_parser import parse
     from rich.console import Console
     from rich.table import Table
 
-    from ..scene.registry import CASES, case_function
-    from ..system.shipped import data_folder, description, shipped_decks
+    from ..scene.registry import CASES, find_case
+    from ..system.shipped import description, shipped_decks
 
     table = Table(box=None, pad_edge=False)
     table.add_column("case", no_wrap=True)
     table.add_column("what it is")
     table.add_column("meshes")
-    for case in CASES:
-        meshes = ["a mesh file"] if case == "custom" else sorted(
-            path.stem for path in (data_folder(case) / "meshes").glob("*.vtu"))
-        table.add_row(case, parse(case_function(case).__doc__ or "").short_description, ", ".join(meshes))
+    for case in map(find_case, CASES):
+        table.add_row(case.name, case.summary, ", ".join(case.meshes) or "a mesh file")
     decks = Table(box=None, pad_edge=False)
     decks.add_column("deck", no_wrap=True)
     decks.add_column("what it is")

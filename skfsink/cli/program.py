@@ -25,27 +25,27 @@ def command(function: Callable[..., Any], arguments: list[str] | None = None, pa
 
     `package` is the one whose module of the same name the function is called by: "cases" or "study".
     """
-    given: set[str] = set()
+    given_names: set[str] = set()
 
     def note(app: App, commands: tuple[str, ...], found: ArgumentCollection) -> None:
-        given.update(argument.name.lstrip("-").replace("-", "_") for argument in found if argument.tokens)
+        given_names.update(argument.name.lstrip("-").replace("-", "_") for argument in found if argument.tokens)
 
     app = App(name=f"python -m skfsink.{package}.{function.__name__}", version=f"skfsink {__version__}", config=note,
               group_commands=Group.create_ordered("Help"))
     app.default(function)
-    run(app, arguments, given)
+    run(app, arguments, given_names)
 
 
-def run(app: App, arguments: list[str] | None, given: Collection[str] = ()) -> NoReturn:
+def run(app: App, arguments: list[str] | None, given_names: Collection[str] = ()) -> NoReturn:
     """Call what the `arguments` ask of `app`, and end the program; see :func:`command`.
 
-    `given`, complete when the call is made, goes into the options of a case.
+    `given_names` of options, complete when the call is made, go into the options of a case.
     """
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends a run as Ctrl-C does
     try:
         call, bound, _ = app.parse_args(arguments, exit_on_error=False, print_error=False)
         if "options" in bound.arguments:
-            bound.arguments["options"] = replace(bound.arguments["options"], given=frozenset(given))
+            bound.arguments["options"] = replace(bound.arguments["options"], given_names=frozenset(given_names))
         call(*bound.args, **bound.kwargs)
     except Interrupted as stop:
         _fail(str(stop), INTERRUPTED)

@@ -21,6 +21,7 @@ def resume(folder: Path, *, quiet: Annotated[bool, Parameter(negative="", show_d
         Show no progress.
     """
     from ..scene.deck import Deck
-    from ..scene.stored import stored_case
+    from ..scene.registry import find_case_of_run
+    from ..scene.stored import StoredScene
 
-    Deck(stored_case(folder), {}).run(resume=folder, quiet=quiet)
+    Deck(find_case_of_run(StoredScene.read(folder), folder).name, {}).run(resume=folder, quiet=quiet)

@@ -6,8 +6,6 @@ import json
 import textwrap
 from collections.abc import Iterator
 
-from docstring_parser import parse
-
 __all__ = ["deck_text", "show"]
 
 WIDTH = 100
@@ -38,29 +36,23 @@ def deck_text(case: str) -> str:
     return "\n".join(_lines(case)) + "\n"
 
 
-def _lines(case: str) -> Iterator[str]:
-    from ..scene.options import Options
-    from ..scene.registry import case_function, parameters_of
-    from ..scene.tables import TABLES
-    from ..units import UNITS
+def _lines(name: str) -> Iterator[str]:
+    from ..scene.registry import find_case
 
-    function = case_function(case)
-    own = parse(function.__doc__ or "")
-    meaning = {p.arg_name: p.description or "" for p in (*parse(Options.__doc__ or "").params, *own.params)}
-    yield from _comment(f"{own.short_description} {own.long_description or ''}")
+    case = find_case(name)
+    yield from _comment(case.description)
     yield "# Plain numbers are in N, mm, MPa and s, the density in kg/m^3; a parameter left out has its default."
-    yield f'case = "{case}"'
+    yield f'case = "{name}"'
     yield ""
     yield "[parameters]"
-    parameters = parameters_of(case)
-    for name, default in sorted(parameters.items(), key=lambda item: item[0] in TABLES):  # tables come last
+    for parameter in sorted(case.parameters.values(), key=lambda parameter: parameter.has_tables):  # tables come last
         yield ""
-        yield from _comment(meaning[name])
-        if name in TABLES:
-            yield from (f"# {line}" for line in EXAMPLES[name])
+        yield from _comment(parameter.meaning)
+        if parameter.has_tables:
+            yield from (f"# {line}" for line in EXAMPLES[parameter.name])
             continue
-        unit = UNITS.get(name)
-        yield f"{name} = " + json.dumps(f"{default!r} {unit}" if unit else default)
+        default = f"{parameter.default!r} {parameter.unit}" if parameter.unit else parameter.default
+        yield f"{parameter.name} = {json.dumps(default)}"
 
 
 def _comment(text: str) -> list[str]:

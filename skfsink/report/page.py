@@ -139,7 +139,7 @@ def _kind(run: Run) -> str:
 def _part(run: Run, label: str, several: bool) -> Part:
     lead = f"{label}: " if several else ""
     pictures = {title: _picture(run.folder / name, title, lead + alt) for name, title, alt in PICTURES}
-    choice = run.summary.get("model") or run.choice
+    choice = run.summary.get("model") or run.model_choice
     rows = tuple(Row(name.replace("_", " "), "", (_flat(value),)) for name, value in choice.items() if name != "text")
     return Part(label, f"{_named(run)}, mesh {run.parameters.get('mesh', EMPTY)}, {_kind(run)}",
                 _note(run), {title: picture for title, picture in pictures.items() if picture}, tuple(run.warnings),

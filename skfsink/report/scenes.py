@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import importlib
-import inspect
 import shlex
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
-from dataclasses import fields
 from typing import Any
 
-import docstring_parser
-
 from ..results.loader import Run
+from ..scene.case import CaseParameter, shared_parameters
 from ..scene.options import Options
+from ..scene.registry import CASES, find_case
+from ..scene.stored import SCENE
 from ..scene.tables import TABLES
 from .tables import EMPTY, Row, Table
 
@@ -31,32 +28,24 @@ def _shown(value: Any) -> str:
         f"{value:g}" if isinstance(value, float) else str(value)
 
 
+def _parameters(case: str) -> Mapping[str, CaseParameter]:
+    """The parameters of a case, or those of all if there is none of that name."""
+    return find_case(case).parameters if case in CASES else shared_parameters()
+
+
 def _defaults(case: str) -> dict[str, Any]:
-    options = {**{f.name: getattr(Options(), f.name) for f in fields(Options)}, **Options().parameters()}
-    try:
-        function = getattr(importlib.import_module(f"skfsink.cases.{case}"), case)
-    except (ImportError, AttributeError):
-        return options
-    return {**options, **{name: p.default for name, p in inspect.signature(function).parameters.items()}}
+    return {**{name: parameter.default for name, parameter in _parameters(case).items()}, **Options().parameters()}
 
 
 def meanings(case: str) -> dict[str, str]:
     """What the parameters of a case are, with unit and range, from the docstrings that `--help` shows."""
-    found = _described(Options)
-    with suppress(ImportError, AttributeError):
-        found |= _described(getattr(importlib.import_module(f"skfsink.cases.{case}"), case))
-    return found
-
-
-def _described(documented: Any) -> dict[str, str]:
-    parsed = docstring_parser.parse(documented.__doc__ or "")
-    return {item.arg_name: " ".join((item.description or "").split()) for item in parsed.params}
+    return {name: parameter.meaning for name, parameter in _parameters(case).items()}
 
 
 def parameter_table(run: Run) -> Table:
     """All parameters of a run beside their defaults."""
-    defaults, said = _defaults(run.case), meanings(run.case)
-    rows = tuple(Row(name, said.get(name, ""), (
+    defaults, meaning_of = _defaults(run.case), meanings(run.case)
+    rows = tuple(Row(name, meaning_of.get(name, ""), (
         _shown(value), _shown(defaults[name]) if name not in TABLES and defaults.get(name, value) != value else ""))
         for name, value in run.parameters.items())
     return Table("Parameters", ("value", "default, where it differs"), rows)
@@ -65,21 +54,21 @@ def parameter_table(run: Run) -> Table:
 def differences(runs: Sequence[Run], labels: Sequence[str]) -> Table:
     """The parameters in which runs differ."""
     names = list(dict.fromkeys(["case", *(name for run in runs for name in run.parameters)]))
-    said: dict[str, str] = {}
+    meaning_of: dict[str, str] = {}
     for run in runs:
-        said = {**meanings(run.case), **said}
+        meaning_of = {**meanings(run.case), **meaning_of}
     rows = []
     for name in names:
         values = [run.case if name == "case" else run.parameters.get(name) for run in runs]
         if any(value != values[0] for value in values):
-            rows.append(Row(name, said.get(name, ""), tuple(map(_shown, values))))
+            rows.append(Row(name, meaning_of.get(name, ""), tuple(map(_shown, values))))
     return Table("Parameters that differ", tuple(labels), tuple(rows))
 
 
 def command_line(run: Run) -> str:
     """The command that computes the run again: all parameters that are not the defaults, or the deck it has left."""
     if run.case == "custom":
-        return shlex.join(["skfsink", "run", str(run.folder / "scene.toml"), "--out", "FOLDER"])
+        return shlex.join(["skfsink", "run", str(run.folder / SCENE), "--out", "FOLDER"])
     defaults = _defaults(run.case)
     words = []
     for name, value in run.parameters.items():

@@ -19,9 +19,8 @@ import meshio
 import numpy as np
 
 from ..errors import OutputError
-from ..scene.tables import joined
+from ..scene.stored import SCENE, StoredScene
 from ..system.files import reported
-from ..system.text import read_toml
 from .frame import frame_file
 from .history import History, Table, deletions_header
 from .series import frame_times
@@ -130,8 +129,8 @@ class Run:
     ----------
     folder: of the run.
     summary: content of `summary.json`; empty if the run is not finished.
-    case, parameters, assumed, choice: content of `scene.toml`; the mesh is the file that was given to the run, not the
-        copy that this keeps.
+    case, parameters, assumed, model_choice: content of `scene.toml`; the mesh is the file that was given to the run,
+        not the copy that this keeps.
     parts: of `analysis="both"` the two runs, "dynamic" and "quasistatic", as far as they were begun; otherwise empty.
     """
 
@@ -140,7 +139,7 @@ class Run:
     case: str
     parameters: dict[str, Any]
     assumed: tuple[str, ...]
-    choice: dict[str, Any]
+    model_choice: dict[str, Any]
     parts: dict[str, Run]
 
     @property
@@ -176,7 +175,7 @@ class Run:
     @cached_property
     def scene(self) -> Scene:
         """The scene, with mesh and material, made again from `scene.toml`."""
-        from ..scene.stored import read_scene
+        from ..scene.registry import read_scene
 
         return read_scene(self.folder)
 
@@ -248,20 +247,9 @@ def load(folder: str | Path) -> Run:
         The folder holds no run, or its files are damaged. Files that are read later raise it when they are.
     """
     folder = Path(folder)
-    path = folder / "scene.toml"
-    if not path.is_file():
-        raise OutputError(f"{folder} holds no run: there is no {path}")
-    try:
-        with reported(f"cannot read {path}"):
-            data = read_toml(path)
-        case = str(data["case"])
-        parameters = joined(data, case == "custom")
-        if "source" in data:
-            parameters["mesh"] = str(data["source"])
-        assumed, choice = tuple(map(str, data.get("assumed", ()))), dict(data.get("choice", {}))
-    except (KeyError, TypeError, ValueError) as error:
-        raise OutputError(f"{path} is not the scene of a run: {error}") from None
+    stored = StoredScene.read(folder)
+    parameters = stored.parameters_given()
     summary = read_summary(folder) if (folder / SUMMARY).exists() else {}
     parts = {name: load(folder / name) for name in ("dynamic", "quasistatic")
-             if parameters.get("analysis") == "both" and (folder / name / "scene.toml").is_file()}
-    return Run(folder, summary, case, parameters, assumed, choice, parts)
+             if parameters.get("analysis") == "both" and (folder / name / SCENE).is_file()}
+    return Run(folder, summary, stored.case, parameters, stored.assumed, dict(stored.model_choice), parts)

@@ -19,8 +19,9 @@ import numpy as np
 
 from ..errors import OutputError
 from ..fem.space import Space
+from ..scene.registry import read_scene
 from ..scene.scene import Scene
-from ..scene.stored import SCENE, read_scene
+from ..scene.stored import SCENE
 from ..system.files import write_atomic
 from ..system.shipped import data_folder
 from .frame import Frame, frame_file, read_frame

@@ -17,6 +17,7 @@ from typing import Any
 
 from ..errors import OutputError, ParameterError
 from ..meshing.outline import has_gmsh
+from ..scene.case import Case
 from ..scene.options import Options
 from ..system.shipped import data_folder
 from .quantities import PATH, relative_error
@@ -76,7 +77,7 @@ class Level:
         values = {**RULED, **self.options}
         for name, value in values.items():
             asked = getattr(options, name)
-            if asked != value and (name in options.given or asked != getattr(defaults, name)):
+            if asked != value and (name in options.given_names or asked != getattr(defaults, name)):
                 raise ParameterError(f"--{name.replace('_', '-')} {asked} is not that of the model {self.name} "
                                      f"({value}); give the one or the other")
         return replace(options, **values, model=self.name)
@@ -169,11 +170,10 @@ class Ladder:
         raise ParameterError(f"no model of {self.case} was measured to give {quantity} within {tolerance:.1%}")
 
 
-def choose_model(case: str, own: Mapping[str, Any], defaults: Mapping[str, Any], options: Options
-                 ) -> tuple[Options, dict[str, Any]]:
-    """The options of the model asked for, and the choice: what is printed (`text`) and stored.
+def choose_model(case: Case, arguments: Mapping[str, Any], options: Options) -> tuple[Options, dict[str, Any]]:
+    """The options of the model asked for, and how it was chosen: what is printed (`text`) and stored.
 
-    `own` are the arguments of the case and `defaults` those it has.
+    `arguments` are those of the case function.
 
     Raises
     ------
@@ -183,41 +183,43 @@ def choose_model(case: str, own: Mapping[str, Any], defaults: Mapping[str, Any],
         "auto", and the models of the case were not measured.
     """
     name, cheaper, why = options.model, "", ""
-    ladder = Ladder(case) if options.model == AUTO or ladder_path(case).is_file() else None
+    ladder = Ladder(case.name) if options.model == AUTO or ladder_path(case.name).is_file() else None
     if options.model == AUTO:
         assert ladder is not None
         name, cheaper, why = ladder.cheapest(options.quantity, options.tolerance, has_gmsh())
-    model = level(case, name)
-    choice: dict[str, Any] = {"model": name, "asked": options.model, "title": model.title, "quantity": options.quantity}
+    model = level(case.name, name)
+    model_choice: dict[str, Any] = {"model": name, "asked": options.model, "title": model.title,
+                                    "quantity": options.quantity}
     text = [f"model {name} ({model.title})"]
     if options.model == AUTO:
-        choice["tolerance"] = options.tolerance
+        model_choice["tolerance"] = options.tolerance
     if ladder is not None and name in ladder.points and "failed" not in ladder.points[name]:
         error, price = ladder.error(name, options.quantity), ladder.points[name]["price_s"]
-        choice |= {"price_s": price, "reference": REFERENCE, "measured_on": ladder.mesh, "processor": ladder.processor}
+        model_choice |= {"price_s": price, "reference": REFERENCE, "measured_on": ladder.mesh,
+                         "processor": ladder.processor}
         if error is not None:
-            choice["error"] = error
-        said = f"{options.quantity} off by {error:.1%}" if error is not None else f"gives no {options.quantity}"
+            model_choice["error"] = error
+        accuracy = f"{options.quantity} off by {error:.1%}" if error is not None else f"gives no {options.quantity}"
         within = f" (tolerance {options.tolerance:.1%})" if options.model == AUTO else ""
-        text.append(f"{said}{within} of the reference {REFERENCE}, {price:.1f} s, measured on mesh {ladder.mesh}")
+        text.append(f"{accuracy}{within} of the reference {REFERENCE}, {price:.1f} s, measured on mesh {ladder.mesh}")
     if ladder is not None and cheaper:
         price = ladder.points[cheaper]["price_s"]
-        choice["cheaper"] = {"model": cheaper, "price_s": price, "refused": why}
+        model_choice["cheaper"] = {"model": cheaper, "price_s": price, "refused": why}
         text.append(f"next cheaper: {cheaper}, {price:.1f} s, refused: {why}")
-    if changed := _changed(own, defaults, options, ladder.mesh if ladder else ""):
-        choice["changed"] = changed
+    if changed := _changed(case, arguments, options, ladder.mesh if ladder else ""):
+        model_choice["changed"] = changed
         text.append(f"measured at default parameters; here {', '.join(changed)} differ{'s' * (len(changed) == 1)}")
-    choice["text"] = "; ".join(text)
-    return model.apply(options), choice
+    model_choice["text"] = "; ".join(text)
+    return model.apply(options), model_choice
 
 
-def _changed(own: Mapping[str, Any], defaults: Mapping[str, Any], options: Options, mesh: str) -> list[str]:
+def _changed(case: Case, arguments: Mapping[str, Any], options: Options, mesh: str) -> list[str]:
     """Names of the parameters that are not those the ladder was measured with."""
-    plain = Options()
-    changed = [name for name, value in own.items() if name != "mesh" and value != defaults[name]]
+    plain, defaults = Options(), case.default_arguments
+    changed = [name for name, value in arguments.items() if name != "mesh" and value != defaults[name]]
     changed += [f.name for f in fields(Options) if f.name in plain.parameters() and f.name not in RULED
                 and getattr(options, f.name) != getattr(plain, f.name)]
-    if mesh and own["mesh"] != mesh:
-        changed.append(f"mesh ({own['mesh']})")
+    if mesh and arguments["mesh"] != mesh:
+        changed.append(f"mesh ({arguments['mesh']})")
     return changed
 

@@ -2,33 +2,33 @@
 
 from __future__ import annotations
 
-import inspect
 import logging
 import os
 import shlex
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ..errors import Interrupted, OutputError, ParameterError
-from ..meshing.kept_mesh import MESH, keep_mesh, mesh_name, origin
-from ..meshing.outline import has_gmsh
+from ..errors import Interrupted
+from ..fields.state import State
+from ..meshing.kept_mesh import MESH, keep_mesh
 from ..pictures.of_a_run import draw_comparison, draw_run
 from ..results.history import History
 from ..results.result import Result
 from ..results.summary import write_summary
-from ..scene.options import NOT_PHYSICS, Options
+from ..scene.case import Case
+from ..scene.options import Options
 from ..scene.scene import Scene
-from ..scene.stored import SCENE, corridor_mesh, kept, read_choice, read_parameters
-from ..system.files import prepare_folder, write_atomic
+from ..scene.stored import SCENE, corridor_mesh
+from ..system.files import prepare_folder
 from .checkpoint import load_checkpoint, load_state
 from .checks import refuse
 from .display import Display
 from .memory import check_memory
-from .model import AUTO, choose_model
 from .occupied import occupied
+from .request import RunRequest, read_request
 from .simulate import Loaded, Simulation
 from .summarize import summarize
 from .two_pass import corridor_report, lay_corridor
@@ -36,13 +36,12 @@ from .two_pass import corridor_report, lay_corridor
 __all__ = ["run_case"]
 
 log = logging.getLogger(__name__)
-SceneMaker = Callable[[dict[str, Any], Options], Scene]
 SUMMARY = "summary.json"
 PARTS = ("dynamic", "quasistatic")  # folders of the two runs of both analyses
 
 
-def run_case(case: Callable[..., Result], make_scene: SceneMaker, own: dict[str, Any], options: Options) -> Result:
-    """Run a case: `own` are the arguments of its function, `make_scene` turns them into a scene.
+def run_case(case: Case, arguments: dict[str, Any], options: Options) -> Result:
+    """Run a case with the arguments of its function (all but `options`, with a `mesh` among them) and the options.
 
     With `options.resume` the arguments are those in that folder's `scene.toml`; any that was given besides must agree.
 
@@ -51,84 +50,50 @@ def run_case(case: Callable[..., Result], make_scene: SceneMaker, own: dict[str,
     Interrupted
         Ctrl-C or SIGTERM; the message says how to go on.
     """
-    name = case.__name__
-    if Path(own["mesh"]).suffix:  # a file: the run may be resumed from another folder
-        own = {**own, "mesh": str(Path(own["mesh"]).absolute())}
-    defaults = {k: p.default for k, p in inspect.signature(case).parameters.items()}
-    choice: dict[str, Any] = {}
-    resume = options.resume is not None
-    if resume:
-        own, options, choice = _resumed(name, own, defaults, options)
-    elif options.model:
-        options, choice = choose_model(name, own, defaults, options)
-    folder = options.resume or options.out or _default_folder(name, own, options)
-    notes: list[str] = []
-    if options.mesh_layout == "two-pass" and not has_gmsh():
-        notes.append("there is no gmsh to make the mesh of two passes: the mesh of the layout corridor is taken")
-        options = replace(options, mesh_layout="corridor")
+    request = read_request(case, arguments, options)
     try:
         with Display(options.quiet) as display:
-            if choice:
-                display.say(choice["text"])
-            scene = replace(make_scene(own, options), choice=choice)
-            check_memory(scene, display)
-            if not resume:
-                refuse(scene)  # before anything is written
-            with ExitStack() as locks:
-                places = [folder, *(folder / part for part in PARTS if options.analysis == "both")]
-                there = [place for place in places if place == folder or os.path.isdir(place)]
-                notes += [locks.enter_context(occupied(place)) for place in there]
-                if not resume:
-                    _begin(folder, options.overwrite)
-                    if options.mesh_layout == "two-pass":
-                        options = lay_corridor(scene, own, options, folder, display)
-                        scene = replace(make_scene(own, options), choice=choice)
-                        check_memory(scene, display)
-                        refuse(scene)
-                notes += [locks.enter_context(occupied(place)) for place in places if place not in there]
-                if options.analysis == "both":
-                    return _run_both(scene, folder, display, resume, notes)
-                return _run_one(scene, folder, display, resume, notes=notes)
+            return _compute(request, display)
     except (Interrupted, KeyboardInterrupt):
-        begun = (folder / SCENE).exists()
-        raise Interrupted("interrupted; " + (f"go on with skfsink resume {shlex.quote(str(folder))}" if begun else
-                                             "nothing was computed yet")) from None
+        begun = (request.folder / SCENE).exists()
+        raise Interrupted("interrupted; " + (f"go on with skfsink resume {shlex.quote(str(request.folder))}" if begun
+                                             else "nothing was computed yet")) from None
 
 
-def _default_folder(case: str, own: dict[str, Any], options: Options) -> Path:
-    mesh = mesh_name(own["mesh"])
-    name = f"{mesh}-{options.analysis}"
-    if options.model:
-        return Path("results") / case / f"{mesh}-{options.model}"
-    if options.analysis != "quasistatic" and options.integrator != "explicit":
-        name += f"-{options.integrator}"
-    return Path("results") / case / name
+def _compute(request: RunRequest, display: Display) -> Result:
+    """Compute what was asked for, in a folder that no other run is in."""
+    folder, both = request.folder, request.options.analysis == "both"
+    if request.model_choice:
+        display.say(request.model_choice["text"])
+    scene = _checked_scene(request, display)
+    folders = [folder, *(folder / part for part in PARTS if both)]
+    before = [place for place in folders if place == folder or os.path.isdir(place)]
+    with ExitStack() as locks:
+        notes = [*request.notes, *_lock(locks, before)]
+        if not request.resumes:
+            _begin(folder, request.options.overwrite)
+            if request.options.mesh_layout == "two-pass":
+                corridor = lay_corridor(scene, request.arguments, request.options, folder, display)
+                request = replace(request, options=corridor)
+                scene = _checked_scene(request, display)
+        notes += _lock(locks, [place for place in folders if place not in before])
+        if both:
+            return _run_both(scene, folder, display, request.resumes, notes)
+        return _run_one(scene, folder, display, request.resumes, notes=notes)
 
 
-def _resumed(case: str, own: dict[str, Any], defaults: dict[str, Any],
-             options: Options) -> tuple[dict[str, Any], Options, dict[str, Any]]:
-    folder = options.resume
-    assert folder is not None
-    if options.out is not None and options.out.absolute() != folder.absolute():
-        raise ParameterError(f"--out {options.out} and --resume {folder} are two folders; a run stays in its own")
-    stored, choice = read_parameters(folder, case), read_choice(folder)
-    if options.model not in ("", AUTO, choice.get("model")):
-        raise ParameterError(f"--model {options.model} is not that of the run in {folder} ({choice.get('model')}); "
-                             f"a resumed run keeps its scene")
-    defaults = {**Options().parameters(), **defaults}
-    for name, value in {**own, **options.parameters()}.items():
-        same = value == stored.get(name) or (name == "mesh" and origin(value) == origin(str(stored.get(name))))
-        if (name in options.given or value != defaults[name]) and not same:
-            raise ParameterError(f"--{name.replace('_', '-')} {value} is not that of the run in {folder} "
-                                 f"({stored.get(name)}); a resumed run keeps its scene")
-    known = {f.name for f in fields(Options)} - set(NOT_PHYSICS)
-    try:
-        own = {k: stored.pop(k, defaults[k]) for k in own}
-        if unknown := stored.keys() ^ known:
-            raise KeyError(*sorted(unknown))
-    except KeyError as error:
-        raise OutputError(f"{folder / SCENE} is not the scene of a run: parameter {error}") from None
-    return own, replace(options, **stored, corridor=corridor_mesh(folder), kept=kept(folder, own)), choice
+def _checked_scene(request: RunRequest, display: Display) -> Scene:
+    """The scene asked for, if it fits into the memory and, of a new run, is such as can be meant."""
+    scene = request.scene()
+    check_memory(scene, display)
+    if not request.resumes:
+        refuse(scene)  # before anything is written
+    return scene
+
+
+def _lock(locks: ExitStack, folders: Sequence[Path]) -> list[str]:
+    """Keep other runs out of the folders until `locks` are left; warnings about those that cannot be locked."""
+    return [locks.enter_context(occupied(folder)) for folder in folders]
 
 
 def _begin(folder: Path, overwrite: bool) -> None:
@@ -142,20 +107,16 @@ def _write_scene(scene: Scene, folder: Path) -> None:
     """Write `scene.toml`, and before it the mesh unless it is one that comes with the program."""
     if scene.sample.source or scene.sample.made:
         keep_mesh(scene.sample, folder / MESH)
-    write_atomic(folder / SCENE, scene.toml(MESH))
+    scene.stored(MESH).write(folder)
 
 
-def _run_both(scene: Scene, folder: Path, display: Display, resume: bool,
-              notes: Sequence[str]) -> Result:
+def _run_both(scene: Scene, folder: Path, display: Display, resumes: bool, notes: Sequence[str]) -> Result:
+    """The dynamic and the quasi-static run of a scene, of which the second begins at the onset of the first."""
     scenes = {analysis: scene.part(analysis) for analysis in PARTS}
-    begun = {analysis: resume and (folder / analysis / SCENE).exists() for analysis in scenes}
-    for analysis, part in scenes.items():  # refuse before any file is touched
-        if begun[analysis]:
-            stored = load_checkpoint(folder / analysis / Simulation.CHECKPOINT, part.fingerprint)
-            if analysis == "dynamic" and stored.state.phase != "loading":
-                load_state(folder / analysis / Simulation.ONSET, part.fingerprint)
-    if not resume:
-        for analysis in scenes:
+    begun = {analysis: resumes and (folder / analysis / SCENE).exists() for analysis in PARTS}
+    _check_parts({analysis: part for analysis, part in scenes.items() if begun[analysis]}, folder)
+    if not resumes:
+        for analysis in PARTS:
             _begin(folder / analysis, overwrite=True)
         _write_scene(scene, folder)
     parts: dict[str, Result] = {}
@@ -163,9 +124,22 @@ def _run_both(scene: Scene, folder: Path, display: Display, resume: bool,
     for analysis, part in scenes.items():
         if not begun[analysis]:
             _begin(folder / analysis, overwrite=True)
-        parts[analysis] = _run_one(part, folder / analysis, display, begun[analysis], onset, notes)
+        parts[analysis] = _run_one(part, folder / analysis, display, begun[analysis], onset=onset, notes=notes)
         if parts[analysis].failed:
             onset = _onset(folder / "dynamic", scenes["dynamic"].fingerprint)
+    return _combined(scene, folder, display, parts)
+
+
+def _check_parts(scenes: Mapping[str, Scene], folder: Path) -> None:
+    """Refuse to go on with parts that cannot, before any file is touched (CheckpointError)."""
+    for analysis, scene in scenes.items():
+        stored = load_checkpoint(folder / analysis / Simulation.CHECKPOINT, scene.fingerprint)
+        if analysis == "dynamic" and stored.state.phase != "loading":
+            load_state(folder / analysis / Simulation.ONSET, scene.fingerprint)
+
+
+def _combined(scene: Scene, folder: Path, display: Display, parts: Mapping[str, Result]) -> Result:
+    """Picture, summary and result of both analyses together."""
     display.phase("output")
     if all(part.failed for part in parts.values()):
         draw_comparison(parts["dynamic"], parts["quasistatic"], folder)
@@ -174,7 +148,7 @@ def _run_both(scene: Scene, folder: Path, display: Display, resume: bool,
                **{name: part.summary for name, part in parts.items()}}
     write_summary(folder / SUMMARY, summary)
     display.update(1.0, str(folder))
-    return Result(folder, scene, summary, first.history, first.state, parts)
+    return Result(folder, scene, summary, first.history, first.state, dict(parts))
 
 
 def _onset(folder: Path, fingerprint: str) -> Loaded:
@@ -182,27 +156,41 @@ def _onset(folder: Path, fingerprint: str) -> Loaded:
     return Loaded(load_state(folder / Simulation.ONSET, fingerprint), memories["observer Strength"])
 
 
-def _run_one(scene: Scene, folder: Path, display: Display, resume: bool, onset: Loaded | None = None,
+def _run_one(scene: Scene, folder: Path, display: Display, resumes: bool, *, onset: Loaded | None = None,
              notes: Sequence[str] = ()) -> Result:
-    simulation = Simulation(scene, folder, display, resume)
+    """The run of a scene of one analysis, from `onset` on if there is one."""
+    simulation = Simulation(scene, folder, display, resumes)
     with simulation.notes:
         for note in filter(None, notes):
             log.warning(note)
-    if not resume:
+    if not resumes:
         simulation.checkpoint()  # from here on the run can be resumed, whenever it is killed
         _write_scene(scene, folder)
+    _announce(simulation, folder, display)
+    state = simulation.run(onset)
+    return _finished(simulation, state, folder, display)
+
+
+def _announce(simulation: Simulation, folder: Path, display: Display) -> None:
+    """Say what is computed, and where."""
+    scene = simulation.scene
     space = scene.sample.space
     for text in scene.sample.notes:
         display.say(f"note: {text}")
     display.say(f"{scene.title}, mesh {scene.sample.name}: {space.n_elements} elements, {int(simulation.free.sum())} + "
                 f"{space.n_nodes} unknowns; {scene.controls.analysis} analysis in {folder}")
-    state = simulation.run(onset)
+
+
+def _finished(simulation: Simulation, state: State, folder: Path, display: Display) -> Result:
+    """Pictures, summary and result of a run that has come to its end."""
+    scene = simulation.scene
     display.phase("output")
     display.update(0.0, "")
     draw_run(scene, folder, "loading" if simulation.unfailed else "run", simulation.frames.moments)
     simulation.costs.lap("output")
-    two = scene.parameters["mesh_layout"] == "two-pass"
-    corridor = {"corridor": corridor_report(simulation, corridor_mesh(folder).parent)} if two else {}  # it may warn
+    corridor = {}
+    if scene.parameters["mesh_layout"] == "two-pass":
+        corridor["corridor"] = corridor_report(simulation, corridor_mesh(folder).parent)  # before the summary: it warns
     summary = {**summarize(scene, simulation), **corridor}
     write_summary(folder / SUMMARY, summary)
     display.update(1.0, str(folder))

@@ -57,7 +57,7 @@ def summarize(scene: Scene, simulation: Simulation) -> dict[str, Any]:
                    "external_work": onset.get("work", 0.0) + ledger.work, "deletion": ledger.deletion,
                    "numerical": ledger.numerical, "released": ledger.released,
                    "balance_error_relative": max(balances, default=0.0) / onset["elastic_energy"] if onset else None},
-        "quantities": measured(scene, simulation), "model": dict(scene.choice) or None,
+        "quantities": measured(scene, simulation), "model": dict(scene.model_choice) or None,
         "whole": {"energy": scene.whole.energy, "load": scene.whole.load, "displacement": scene.whole.displacement},
         "deleted_elements": int(state.deleted.sum()), "warnings": simulation.notes.texts,
         "notes": list(scene.sample.notes),

@@ -92,9 +92,11 @@ def first_pass(scene: Scene, folder: Path, display: Display) -> tuple[np.ndarray
             {"elements": space.n_elements, "wall_s": wall["loading"] + wall["event"]})
 
 
-def lay_corridor(scene: Scene, own: Mapping[str, Any], options: Options, folder: Path,
+def lay_corridor(scene: Scene, arguments: Mapping[str, Any], options: Options, folder: Path,
                  display: Display) -> Options:
-    """Make the mesh of two passes in the folder of a run, and return the options with it; `scene` is the first one's.
+    """Make the mesh of two passes in the folder of a run, and return the options with it.
+
+    `scene` is that of the first pass, made from the `arguments` of the case function.
 
     Raises
     ------
@@ -104,7 +106,7 @@ def lay_corridor(scene: Scene, own: Mapping[str, Any], options: Options, folder:
     places, cost = first_pass(scene, folder / FIRST_PASS, display)
     start = time.perf_counter()
     corridor = Corridor(places, options.length_scale)
-    mesh = shape_mesh(scene.case, own, laid_out(scene.case, own["mesh"], options, corridor))
+    mesh = shape_mesh(scene.case, arguments, laid_out(scene.case, arguments["mesh"], options, corridor))
     with replaced(folder / CORRIDOR) as part:
         write_mesh(part, mesh)
     with replaced(folder / PATH) as part, open(part, "wb") as file:

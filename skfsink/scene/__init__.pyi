@@ -1,8 +1,10 @@
+from .case import Case as Case
 from .controls import Controls as Controls
 from .deck import Deck as Deck
 from .deck import read_deck as read_deck
 from .options import Options as Options
 from .registry import CASES as CASES
-from .registry import case_function as case_function
+from .registry import find_case as find_case
+from .registry import read_scene as read_scene
 from .scene import Scene as Scene
-from .stored import read_scene as read_scene
+from .stored import StoredScene as StoredScene

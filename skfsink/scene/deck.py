@@ -13,20 +13,20 @@ A `custom` scene also has tables [[grips]], [[tractions]] and [[regions]] (see :
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import tomli_w
+
 from ..errors import ParameterError
 from ..system.text import read_toml
-from ..units import UNITS, number_in
 from .options import Options
-from .registry import CASES, case_function, parameters_of
-from .tables import TABLES, joined, read_tables
+from .registry import CASES, find_case
+from .tables import TABLES, tables_beside
 
-__all__ = ["Deck", "read_deck", "read_value"]
+__all__ = ["Deck", "read_deck"]
 
 TOP = ("case", "parameters", "source", "assumed", "choice")  # the last three a run says of itself; a deck may have them
 LARGEST = 1_000_000  # bytes
@@ -41,15 +41,17 @@ class Deck:
 
     def run(self, **output: Any) -> Any:
         """Run it, to a :class:`.Result`; `output` are the options that say where: out, overwrite, quiet, resume."""
-        own, options = self.check()
-        return case_function(self.case)(**own, options=replace(options, **output))
+        arguments, options = self.check()
+        return find_case(self.case).function(**arguments, options=replace(options, **output))
 
     def check(self) -> tuple[dict[str, Any], Options]:
         """The arguments of the case function, those of the sample and the options; the latter are checked."""
-        names = [name for name in inspect.signature(case_function(self.case)).parameters if name != "options"]
-        own = {name: self.parameters[name] for name in names if name in self.parameters}
-        shared = {name: value for name, value in self.parameters.items() if name not in names}
-        return own, replace(Options(), **shared, given=frozenset(self.parameters))
+        arguments, values = find_case(self.case).divide(self.parameters)
+        return arguments, replace(Options(), **values, given_names=frozenset(self.parameters))
+
+    def toml(self) -> str:
+        """Its text."""
+        return tomli_w.dumps({"case": self.case, **tables_beside(self.parameters)})
 
 
 def read_deck(path: Path) -> Deck:
@@ -69,45 +71,31 @@ def read_deck(path: Path) -> Deck:
     except (OSError, ValueError, RecursionError) as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise ParameterError(f"{path} is no deck: {reason}") from None
-    case, parameters = data.get("case"), data.setdefault("parameters", {})
-    top = (*TOP, *TABLES) if case == "custom" else TOP
-    if unknown := [key for key in data if key not in top]:
-        raise ParameterError(f"{path}: {unknown[0]!r} is none of {', '.join(top)}")
-    if not isinstance(case, str) or not isinstance(parameters, dict):
-        raise ParameterError(f"{path}: case must be a name, one of {', '.join(CASES)}, and parameters a table")
     try:
-        known = parameters_of(case)
-        if twice := parameters.keys() & TABLES.keys():
-            raise ParameterError(f"{min(twice)} are tables beside the parameters: [[{min(twice)}]]")
-        read = {name: read_value(name, value, known) for name, value in joined(data, case == "custom").items()}
+        deck = _deck(data)
     except ParameterError as error:
         raise ParameterError(f"{path}: {error}") from None
-    if "mesh" in read and Path(read["mesh"]).suffix:
-        read["mesh"] = str((path.parent / read["mesh"]).absolute())
-    return Deck(case, read)
+    if Path(mesh := deck.parameters.get("mesh", "")).suffix:
+        return replace(deck, parameters={**deck.parameters, "mesh": str((path.parent / mesh).absolute())})
+    return deck
 
 
-def read_value(name: str, value: Any, known: Mapping[str, Any]) -> Any:
-    """The value of a parameter, `known` with its default: text with a unit becomes a number in the parameter's unit.
-
-    Raises
-    ------
-    ParameterError
-        There is no such parameter, or it has no such value.
-    """
-    if name not in known:
-        raise ParameterError(f"{name!r} is no parameter; `skfsink show CASE` lists them")
-    default = known[name]
-    if name in TABLES:
-        return read_tables(name, value)
-    if isinstance(default, bool):
-        if not isinstance(value, bool):
-            raise ParameterError(f"{name} must be true or false; got {value!r}")
-        return value
-    if isinstance(default, str):
-        if not isinstance(value, str) or not value.isprintable():
-            path = name == "mesh" and isinstance(value, str)
-            raise ParameterError(f"{name} must be text; got {value!r:.80}" + (
-                r": for \ in a path write /, or put the path in single quotes" if path else ""))
-        return value
-    return number_in(name, value, UNITS.get(name, ""))
+def _deck(data: Mapping[str, Any]) -> Deck:
+    """The deck in the content of a file."""
+    name, parameters = data.get("case"), data.get("parameters", {})
+    case = find_case(name) if isinstance(name, str) and name in CASES else None
+    tables = [p.name for p in case.arguments if p.has_tables] if case else []
+    top = (*TOP, *tables)
+    if unknown := [key for key in data if key not in top]:
+        raise ParameterError(f"{unknown[0]!r} is none of {', '.join(top)}")
+    if not isinstance(name, str) or not isinstance(parameters, dict):
+        raise ParameterError(f"case must be a name, one of {', '.join(CASES)}, and parameters a table")
+    known = (case or find_case(name)).parameters
+    if twice := parameters.keys() & TABLES.keys():
+        raise ParameterError(f"{min(twice)} are tables beside the parameters: [[{min(twice)}]]")
+    read = {}
+    for key, value in {**parameters, **{table: data.get(table, ()) for table in tables}}.items():
+        if key not in known:
+            raise ParameterError(f"{key!r} is no parameter; `skfsink show CASE` lists them")
+        read[key] = known[key].read(value)
+    return Deck(name, read)

@@ -23,12 +23,15 @@ from ..material import (
     own_constants,
 )
 from ..methods.controls import ExplicitControls, HHTControls, StaticsControls
+from ..units import Unit
 from .controls import Controls, choose
 
-__all__ = ["LAYOUTS", "QUANTITIES", "SAMPLE", "Options"]
+__all__ = ["LAYOUTS", "NOT_PHYSICS", "OUTSIDE_A_DECK", "QUANTITIES", "SAMPLE", "Options"]
 
-# say where a run goes, or how its model was chosen, not what it is
-NOT_PHYSICS = ("model", "tolerance", "quantity", "corridor", "out", "resume", "overwrite", "quiet", "kept", "given")
+#: options that say where a run goes, or are set by the run itself
+OUTSIDE_A_DECK = ("out", "resume", "overwrite", "quiet", "corridor", "kept_mesh", "given_names")
+#: options that are no part of a scene: those, and how its model was chosen
+NOT_PHYSICS = ("model", "tolerance", "quantity", *OUTSIDE_A_DECK)
 LAYOUTS = ("corridor", "uniform", "two-pass")
 QUANTITIES = ("onset_load", "onset_displacement", "U", "D", "arrival_time", "tip_speed", "crack_path")
 
@@ -158,9 +161,9 @@ class Options:
         Show no progress.
     corridor
         Mesh that the first of two passes has left; set by the run.
-    kept
+    kept_mesh
         Mesh of the body that the run has left in its folder; set by the run.
-    given
+    given_names
         Names of the options that a command line gave; a resumed run checks that they are its own.
     """
 
@@ -173,47 +176,47 @@ class Options:
     mesh_layout: Annotated[str, MODEL] = "corridor"
     active_zone: Annotated[bool, MODEL_FLAG] = True
     material: Annotated[str, MATERIAL] = "aaa"
-    c1: Annotated[float, MATERIAL] = 0.617
-    c2: Annotated[float, MATERIAL] = 1.215
+    c1: Annotated[float, MATERIAL, Unit("MPa")] = 0.617
+    c2: Annotated[float, MATERIAL, Unit("MPa")] = 1.215
     constants: Annotated[str, MATERIAL] = ""
-    bulk_modulus: Annotated[float, MATERIAL] = 500.0
-    density: Annotated[float, MATERIAL] = 1433.0
-    phi: Annotated[float, SINK] = 0.0
+    bulk_modulus: Annotated[float, MATERIAL, Unit("MPa")] = 500.0
+    density: Annotated[float, MATERIAL, Unit("kg/m^3")] = 1433.0
+    phi: Annotated[float, SINK, Unit("MPa")] = 0.0
     m: Annotated[float, SINK, Parameter(name=["--m"])] = 10.0
-    length_scale: Annotated[float, SINK] = 0.1
+    length_scale: Annotated[float, SINK, Unit("mm")] = 0.1
     sink: Annotated[str, SINK] = "lumped"
     deletion: Annotated[float, SINK] = 1e-6
     force_floor: Annotated[float, SINK] = 1e-3
-    speed: Annotated[float, LOADING] = 1e-3
+    speed: Annotated[float, LOADING, Unit("mm/s")] = 1e-3
     overshoot: Annotated[float, LOADING] = 0.005
     analysis: Annotated[str, ANALYSIS] = "dynamic"
     integrator: Annotated[str, ANALYSIS] = "explicit"
     front: Annotated[float, ANALYSIS] = 0.8
     element: Annotated[str, ANALYSIS] = "jbar"
-    event_time: Annotated[float, ANALYSIS] = 2e-4
-    aftermath: Annotated[float, ANALYSIS] = 1e-5
+    event_time: Annotated[float, ANALYSIS, Unit("s")] = 2e-4
+    aftermath: Annotated[float, ANALYSIS, Unit("s")] = 1e-5
     courant: Annotated[float, EXPLICIT] = 0.8
     gamma_every: Annotated[int, EXPLICIT] = 0
     mass_floor: Annotated[float, EXPLICIT] = 1e-3
     hht_alpha: Annotated[float, HHT] = -0.05
-    hht_dt: Annotated[float, HHT] = 1.6e-7
+    hht_dt: Annotated[float, HHT, Unit("s")] = 1.6e-7
     coupling: Annotated[str, HHT] = "iterated"
     mass: Annotated[str, HHT] = "lumped"
     balance_tolerance: Annotated[float, CONTROLS] = 0.05
-    record_every: Annotated[float, CONTROLS] = 1e-6
-    frame_every: Annotated[float, CONTROLS] = 5e-6
-    checkpoint_every: Annotated[float, CONTROLS] = 20.0
+    record_every: Annotated[float, CONTROLS, Unit("s")] = 1e-6
+    frame_every: Annotated[float, CONTROLS, Unit("s")] = 5e-6
+    checkpoint_every: Annotated[float, CONTROLS, Unit("s")] = 20.0
     threads: Annotated[int, CONTROLS] = 0
     out: Annotated[Path | None, OUTPUT] = None
     resume: Annotated[Path | None, OUTPUT] = None
     overwrite: Annotated[bool, OUTPUT, FLAG] = False
     quiet: Annotated[bool, OUTPUT, FLAG] = False
     corridor: Annotated[Path | None, Parameter(parse=False)] = None
-    kept: Annotated[Path | None, Parameter(parse=False)] = None
-    given: Annotated[frozenset[str], Parameter(parse=False)] = frozenset()
+    kept_mesh: Annotated[Path | None, Parameter(parse=False)] = None
+    given_names: Annotated[frozenset[str], Parameter(parse=False)] = frozenset()
 
     def __post_init__(self) -> None:
-        for name in ("out", "resume", "corridor", "kept"):
+        for name in ("out", "resume", "corridor", "kept_mesh"):
             if isinstance(folder := getattr(self, name), str):
                 object.__setattr__(self, name, Path(folder))
         require("speed", self.speed, "mm/s", low=0, low_open=True)
@@ -233,14 +236,15 @@ class Options:
             return AAA(self.bulk_modulus, self.density, self.c1, self.c2)
         text = self._constants()
         of_nu = own_constants(self.material, text)[1] if self.material in MATERIALS else None
-        if of_nu is not None and ("bulk_modulus" in self.given or self.bulk_modulus != Options.bulk_modulus):
+        if of_nu is not None and ("bulk_modulus" in self.given_names or self.bulk_modulus != Options.bulk_modulus):
             raise ParameterError(f"bulk_modulus {self.bulk_modulus!r} MPa and the nu of the constants ({of_nu:.6g} "
                                  f"MPa) say the same: give one of them")
         return material_of(self.material, text, self.bulk_modulus, self.density)
 
     def _constants(self) -> str:
         """Text of the constants of the law, with those of aaa that are options of their own."""
-        changed = [name for name in ("c1", "c2") if name in self.given or getattr(self, name) != getattr(Options, name)]
+        changed = [name for name in ("c1", "c2")
+                   if name in self.given_names or getattr(self, name) != getattr(Options, name)]
         if self.material != "aaa":
             for name in changed:
                 if getattr(self, name) != getattr(Options, name):

@@ -1,4 +1,4 @@
-"""A scene: everything that defines a run, and its file `scene.toml`."""
+"""A scene: everything that defines a run."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-import tomli_w
 
 from ..errors import ParameterError
 from ..fields.momentum import check_element
@@ -20,7 +19,7 @@ from ..meshing.sample import Sample
 from ..meshing.symmetry import Whole
 from .controls import Controls
 from .digest import digest
-from .tables import split
+from .stored import StoredScene
 
 __all__ = ["Scene"]
 
@@ -48,7 +47,7 @@ class Scene:
     flat: maps points of the body (n, dim) to its section (n, 2) [mm].
     controls: how it is computed.
     assumed: statements about lengths that the paper does not print.
-    choice: of a model, as it is printed and stored; it does not decide results beyond the parameters.
+    model_choice: how the model was chosen, as it is printed and stored; it decides nothing beyond the parameters.
 
     Raises
     ------
@@ -74,7 +73,7 @@ class Scene:
     flat: Callable[[np.ndarray], np.ndarray] = _first_two
     controls: Controls = field(default_factory=Controls)
     assumed: tuple[str, ...] = ()
-    choice: Mapping[str, Any] = field(default_factory=dict)
+    model_choice: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for boundary in (load.boundary for group in (self.grips, self.rollers, self.tractions) for load in group):
@@ -144,17 +143,11 @@ class Scene:
                 row[:] = [v.rate(0.0) if isinstance(v, Ramp) else v or 0.0 for v in grip.velocity]
         return float(np.linalg.norm(velocity[0] - velocity[1]))
 
-    def toml(self, mesh: str = "") -> str:
-        """Text of `scene.toml`; `mesh` is the name of a file beside it that keeps the mesh of a file of the user's."""
-        head = ("# A run of skfsink. Run it again with: skfsink run scene.toml\n"
-                "# Plain numbers are in N, mm, MPa and s; density in kg/m^3.\n")
-        parameters = {k: v.item() if isinstance(v, np.generic) else v for k, v in self.parameters.items()}
-        source = {}
-        if mesh and self.sample.source:
-            parameters["mesh"], source = mesh, {"source": self.sample.source}
-        choice = {"choice": dict(self.choice)} if self.choice else {}
-        return head + tomli_w.dumps({"case": self.case, **source, **split(parameters), "assumed": list(self.assumed),
-                                     **choice})
+    def stored(self, mesh_file: str = "") -> StoredScene:
+        """What `scene.toml` is to say of it; `mesh_file` is a file beside it that keeps the mesh of a user's file."""
+        source = self.sample.source if mesh_file else ""
+        parameters = {**self.parameters, "mesh": mesh_file} if source else self.parameters
+        return StoredScene(self.case, parameters, source, self.assumed, self.model_choice)
 
     @property
     def fingerprint(self) -> str:
@@ -162,7 +155,7 @@ class Scene:
 
         It has two parts, the older one of which checkpoints of earlier versions have alone; see :mod:`.checkpoint`.
         """
-        text = replace(self, parameters={**self.parameters, "mesh": ""}, choice={}).toml()
+        text = replace(self, parameters={**self.parameters, "mesh": ""}, model_choice={}).stored().toml()
         hashed, space = hashlib.sha256(text.encode()), self.sample.space
         for array in (space.X, space.conn, *(nodes for _, nodes in sorted(self.sample.boundaries.items()))):
             hashed.update(array.tobytes())

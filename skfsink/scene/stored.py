@@ -1,106 +1,98 @@
-"""The scene of a run in its folder: the one reader of `scene.toml`."""
+"""`scene.toml`, which a run leaves in its folder: what it says, read and written here alone. It is a deck as well."""
 
 from __future__ import annotations
 
-import importlib
-import inspect
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import tomli_w
+
 from ..errors import OutputError
 from ..meshing.kept_mesh import MESH
+from ..system.files import reported, write_atomic
 from ..system.text import read_toml
-from .options import Options
-from .registry import CASES
-from .scene import Scene
-from .tables import joined
+from .tables import TABLES, tables_beside
 
-__all__ = ["CORRIDOR", "SCENE", "corridor_mesh", "kept", "read_choice", "read_parameters", "read_scene", "stored_case"]
+__all__ = ["CORRIDOR", "SCENE", "StoredScene", "corridor_mesh", "kept_mesh"]
 
 SCENE, CORRIDOR = "scene.toml", "corridor.vtu"
-LATER = ("merge_nodes",)  # parameters that a scene.toml of an earlier version has not; they take their defaults
+HEAD = ("# A run of skfsink. Run it again with: skfsink run scene.toml\n"
+        "# Plain numbers are in N, mm, MPa and s; density in kg/m^3.\n")
 
 
-def read_scene(folder: Path) -> Scene:
-    """The scene of a run, made again from its `scene.toml`; options that this does not name have their defaults.
+@dataclass(frozen=True)
+class StoredScene:
+    """What `scene.toml` says of a run.
 
-    Raises
-    ------
-    OutputError
-        The folder holds no readable scene, or one of a case or with a parameter that do not exist.
+    Attributes
+    ----------
+    case: name of the case.
+    parameters: by name, as they are in the file; `mesh` is a name, or a path relative to the folder.
+    source: mesh file of the user's that the mesh in the folder was read from; "" for other meshes.
+    assumed: statements about lengths that the paper does not print.
+    model_choice: how the model was chosen; empty if it was not.
     """
-    path = folder / SCENE
-    if not path.is_file():
-        raise OutputError(f"{folder} holds no run: there is no {path}")
-    try:
-        case = str(read_toml(path)["case"])
-        module = importlib.import_module(f"skfsink.cases.{case}")
-        stored = read_parameters(folder, case)
-        own = {name: stored.pop(name, p.default) if name in LATER else stored.pop(name)
-               for name, p in inspect.signature(getattr(module, case)).parameters.items() if name != "options"}
-        options = replace(Options(), **stored, corridor=corridor_mesh(folder), kept=kept(folder, own))
-    except (ModuleNotFoundError, ValueError, AttributeError, KeyError, TypeError) as error:
-        raise OutputError(f"{path} is not the scene of a run: {error}") from None
-    scene: Scene = module._scene(own, options)
-    return scene
+
+    case: str
+    parameters: Mapping[str, Any]
+    source: str = ""
+    assumed: tuple[str, ...] = ()
+    model_choice: Mapping[str, Any] = field(default_factory=dict)
+
+    @classmethod
+    def read(cls, folder: Path) -> StoredScene:
+        """The scene of the run in a folder.
+
+        Raises
+        ------
+        OutputError
+            The folder holds no run, or its scene is none.
+        """
+        path = folder / SCENE
+        if not path.is_file():
+            raise OutputError(f"{folder} holds no run: there is no {path}")
+        try:
+            with reported(f"cannot read {path}"):
+                document = read_toml(path)
+            tables = TABLES if TABLES.keys() & document.keys() else ()
+            return cls(str(document["case"]),
+                       {**document["parameters"], **{name: document.get(name, ()) for name in tables}},
+                       str(document.get("source", "")), tuple(map(str, document.get("assumed", ()))),
+                       dict(document.get("choice", {})))
+        except (KeyError, TypeError, ValueError, RecursionError) as error:
+            raise OutputError(f"{path} is not the scene of a run: {error}") from None
+
+    def write(self, folder: Path) -> None:
+        """Write it to a folder (OutputError)."""
+        write_atomic(folder / SCENE, self.toml())
+
+    def toml(self) -> str:
+        """Its text."""
+        parameters = {k: v.item() if isinstance(v, np.generic) else v for k, v in self.parameters.items()}
+        source = {"source": self.source} if self.source else {}
+        choice = {"choice": dict(self.model_choice)} if self.model_choice else {}
+        return HEAD + tomli_w.dumps({"case": self.case, **source, **tables_beside(parameters),
+                                     "assumed": list(self.assumed), **choice})
+
+    def parameters_in(self, folder: Path) -> dict[str, Any]:
+        """The parameters, with the path of the mesh file that the run in this folder is computed on."""
+        mesh = str(self.parameters.get("mesh", ""))
+        return {**self.parameters, **({"mesh": str((folder / mesh).absolute())} if Path(mesh).suffix else {})}
+
+    def parameters_given(self) -> dict[str, Any]:
+        """The parameters, with the mesh file that was given to the run, not the copy it keeps."""
+        return {**self.parameters, **({"mesh": self.source} if self.source else {})}
 
 
-def kept(folder: Path, own: Mapping[str, Any]) -> Path | None:
-    """Mesh that a run has left in its folder, where the parameters do not name it: one that was made by gmsh."""
-    return None if Path(own["mesh"]).suffix or not (folder / MESH).is_file() else folder / MESH
+def kept_mesh(folder: Path, mesh: str) -> Path | None:
+    """Mesh that a run has left in its folder, where its parameter `mesh` does not name it: one made by gmsh."""
+    return None if Path(mesh).suffix or not (folder / MESH).is_file() else folder / MESH
 
 
 def corridor_mesh(folder: Path) -> Path:
     """Mesh of two passes of a run, or of the two runs that it is one of."""
     above = folder.parent / CORRIDOR
     return above if not (folder / CORRIDOR).exists() and above.exists() else folder / CORRIDOR
-
-
-def read_parameters(folder: Path, case: str) -> dict[str, Any]:
-    """Parameters in the `scene.toml` of a run; a mesh file that it keeps is given by its path.
-
-    Raises
-    ------
-    OutputError
-        The folder holds no readable scene, or one of another case.
-    """
-    path = folder / SCENE
-    if not path.is_file():
-        raise OutputError(f"{folder} holds no run to resume: there is no {path}")
-    try:
-        data = read_toml(path)
-        found, parameters = str(data["case"]), joined(data, case == "custom")
-    except (OSError, KeyError, TypeError, ValueError) as error:
-        raise OutputError(f"{path} is not the scene of a run: {error}") from None
-    if found != case:
-        raise OutputError(f"{folder} holds a run of case {found}, not of {case}")
-    if Path(mesh := str(parameters.get("mesh", ""))).suffix:
-        parameters["mesh"] = str((folder / mesh).absolute())
-    return parameters
-
-
-def read_choice(folder: Path) -> dict[str, Any]:
-    """The choice of a model in the `scene.toml` of a run; empty if there is none."""
-    return dict(read_toml(folder / SCENE).get("choice", {}))
-
-
-def stored_case(folder: Path) -> str:
-    """The case of the run in a folder.
-
-    Raises
-    ------
-    OutputError
-        It holds no run.
-    """
-    path = folder / SCENE
-    if not path.is_file():
-        raise OutputError(f"{folder} holds no run: there is no {path}")
-    try:
-        case = read_toml(path)["case"]
-    except (OSError, ValueError, KeyError) as error:
-        raise OutputError(f"{path} is not the scene of a run: {error}") from None
-    if case not in CASES:
-        raise OutputError(f"{path} is not the scene of a run: its case is {case!r}")
-    return str(case)

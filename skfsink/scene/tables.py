@@ -19,7 +19,7 @@ from ..material import MATERIALS, own_constants
 from ..material.regions import RegionLaw, one_bulk_modulus
 from ..units import number_in
 
-__all__ = ["TABLES", "grip_from", "grips_of", "joined", "read_tables", "region_from", "split",
+__all__ = ["TABLES", "grip_from", "grips_of", "read_tables", "region_from", "tables_beside",
            "traction_from", "tractions_of"]
 
 AXES = ("x", "y", "z")
@@ -158,12 +158,7 @@ def read_tables(name: str, value: Any) -> tuple[dict[str, Any], ...]:
     return tuple(write(read(table)) for table in value)
 
 
-def split(parameters: Mapping[str, Any]) -> dict[str, Any]:
-    """Parameters of a scene as a deck has them: numbers and text in `parameters`, each kind of tables beside it."""
+def tables_beside(parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """Parameters as a deck has them: numbers and text in the table `parameters`, and beside it each kind of tables."""
     tables = {name: [dict(table) for table in parameters[name]] for name in TABLES if parameters.get(name)}
     return {"parameters": {name: value for name, value in parameters.items() if name not in TABLES}, **tables}
-
-
-def joined(deck: Mapping[str, Any], custom: bool) -> dict[str, Any]:
-    """Parameters of a scene from what :func:`split` made; only a `custom` scene has tables."""
-    return {**deck["parameters"], **({name: deck.get(name, ()) for name in TABLES} if custom else {})}

@@ -13,8 +13,6 @@ import os
 for _name in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
-import importlib
-import inspect
 import tempfile
 import time
 from functools import partial
@@ -30,6 +28,7 @@ from ..run.quantities import crack_cells, measured
 from ..run.simulate import Simulation
 from ..run.two_pass import corridor_report, lay_corridor
 from ..scene.options import Options
+from ..scene.registry import find_case
 from ..scene.scene import Scene
 from .ladder_chart import draw_ladders
 from .store import Store
@@ -82,11 +81,9 @@ def _file(case: str, out: Path | None) -> Path:
 
 def scene_of(case: str, options: Options, mesh: str, **dimensions: Any) -> tuple[Scene, dict[str, Any]]:
     """The scene of a case and the arguments of its function."""
-    module = importlib.import_module(f"skfsink.cases.{case}")
-    own = {name: parameter.default for name, parameter in inspect.signature(getattr(module, case)).parameters.items()
-           if name != "options"} | {"mesh": mesh} | dimensions
-    scene: Scene = module._scene(own, options)
-    return scene, own
+    found = find_case(case)
+    arguments = {**found.default_arguments, "mesh": mesh, **dimensions}
+    return found.scene(arguments, options), arguments
 
 
 def measure(case: str, name: str, mesh: str = "", base: Options = Options()) -> dict[str, Any]:  # noqa: B008
@@ -99,9 +96,9 @@ def measure(case: str, name: str, mesh: str = "", base: Options = Options()) -> 
     options = level(case, "dynamics" if seed else name).apply(base)
     with tempfile.TemporaryDirectory() as temporary, Display(quiet=True) as display:
         folder, start, cpu = Path(temporary), time.perf_counter(), time.process_time()
-        scene, own = scene_of(case, options, mesh, **seed)
+        scene, arguments = scene_of(case, options, mesh, **seed)
         if options.mesh_layout == "two-pass":
-            options = lay_corridor(scene, own, options, folder, display)
+            options = lay_corridor(scene, arguments, options, folder, display)
             scene, _ = scene_of(case, options, mesh)
         made = time.perf_counter() - start
         simulation = Simulation(scene, folder, display)

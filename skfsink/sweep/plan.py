@@ -10,15 +10,13 @@ from pathlib import Path, PureWindowsPath
 from typing import Any
 
 import numpy as np
-import tomli_w
 
 from ..errors import Interrupted, OutputError, require
 from ..meshing.kept_mesh import MESH
 from ..meshing.sample import file_sample
 from ..run.display import Display
 from ..scene.deck import Deck, read_deck
-from ..scene.registry import parameters_of
-from ..scene.tables import split
+from ..scene.registry import find_case
 from ..system.files import reported, write_atomic
 from .engine import here, on_scheduler
 from .one import DECK, FAILURE, RUN, finished
@@ -41,7 +39,7 @@ def run_sweep(path: Path, vary: Sequence[str], out: Path, jobs: int = 1, schedul
     """
     require("jobs", jobs, low=1, high=256, whole=True)
     deck = read_deck(path)
-    known = parameters_of(deck.case)
+    known = find_case(deck.case).parameters
     variations = [read_variation(text, known) for text in vary]
     varied = list(combinations(variations))
     folders = [out / _name(values) for values in varied]
@@ -96,9 +94,9 @@ def _moved(present: Path, text: str) -> bool:
     names = [PureWindowsPath(path).name for path in paths]  # has both kinds of slashes
     if old != new or names[0] != names[1] or not Path(names[1]).suffix:
         return False
-    kept = present.parent / RUN / MESH
-    if kept.is_file() and Path(paths[1]).is_file():
-        one, other = file_sample(kept).space, file_sample(Path(paths[1])).space
+    mesh_of_run = present.parent / RUN / MESH
+    if mesh_of_run.is_file() and Path(paths[1]).is_file():
+        one, other = file_sample(mesh_of_run).space, file_sample(Path(paths[1])).space
         if not (np.array_equal(one.X, other.X) and np.array_equal(one.conn, other.conn)):
             raise OutputError(f"{present.parent} holds a run on another mesh than {paths[1]}; choose another --out")
     return True
@@ -113,7 +111,7 @@ def _lay_out(deck: Deck, varied: Sequence[Mapping[str, Any]], folders: Sequence[
     for values in varied:
         whole = replace(deck, parameters={**deck.parameters, **values})
         whole.check()
-        texts.append(tomli_w.dumps({"case": whole.case, **split(whole.parameters)}))
+        texts.append(whole.toml())
     for folder, text in zip(folders, texts):
         present = folder / DECK
         if present.is_file() and present.read_text(encoding="utf-8") != text and not _moved(present, text):

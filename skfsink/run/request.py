@@ -1,0 +1,116 @@
+"""What a run was asked for, complete: by a call, or by the folder of a run that is to go on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from ..errors import OutputError, ParameterError
+from ..meshing.kept_mesh import mesh_name, origin
+from ..meshing.outline import has_gmsh
+from ..scene.case import Case, shared_parameters
+from ..scene.options import NOT_PHYSICS, Options
+from ..scene.scene import Scene
+from ..scene.stored import SCENE, StoredScene, corridor_mesh, kept_mesh
+from .model import AUTO, choose_model
+
+__all__ = ["RunRequest", "read_request"]
+
+
+@dataclass(frozen=True)
+class RunRequest:
+    """A case, the arguments of its function, and the options.
+
+    Attributes
+    ----------
+    case, arguments, options: as they are to be computed.
+    model_choice: how the model was chosen; empty if none was asked for.
+    notes: warnings about what could not be had.
+    """
+
+    case: Case
+    arguments: dict[str, Any]
+    options: Options
+    model_choice: Mapping[str, Any] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+    @property
+    def resumes(self) -> bool:
+        """Whether it goes on with a run."""
+        return self.options.resume is not None
+
+    @property
+    def folder(self) -> Path:
+        """Folder of the run: the one that was named, or one named after case, mesh and analysis."""
+        options, mesh = self.options, mesh_name(self.arguments["mesh"])
+        if options.resume or options.out:
+            return Path(options.resume or options.out or "")
+        name = f"{mesh}-{options.model or options.analysis}"
+        if not options.model and options.analysis != "quasistatic" and options.integrator != "explicit":
+            name += f"-{options.integrator}"
+        return Path("results") / self.case.name / name
+
+    def scene(self) -> Scene:
+        """The scene, with its mesh."""
+        return replace(self.case.scene(self.arguments, self.options), model_choice=self.model_choice)
+
+
+def read_request(case: Case, arguments: dict[str, Any], options: Options) -> RunRequest:
+    """The request that the arguments of a case function and the options make; see :func:`.run_case`.
+
+    Raises
+    ------
+    ParameterError
+        A model, or something else than the run to go on with, was asked for that cannot be.
+    OutputError
+        There is no run to go on with, or no measured model.
+    """
+    if Path(arguments["mesh"]).suffix:  # a file: the run may be resumed from another folder
+        arguments = {**arguments, "mesh": str(Path(arguments["mesh"]).absolute())}
+    if options.resume is not None:
+        request = _resumed(RunRequest(case, arguments, options), options.resume)
+    elif options.model:
+        request = RunRequest(case, arguments, *choose_model(case, arguments, options))
+    else:
+        request = RunRequest(case, arguments, options)
+    if request.options.mesh_layout == "two-pass" and not has_gmsh():
+        note = "there is no gmsh to make the mesh of two passes: the mesh of the layout corridor is taken"
+        return replace(request, options=replace(request.options, mesh_layout="corridor"), notes=(note,))
+    return request
+
+
+def _resumed(asked: RunRequest, folder: Path) -> RunRequest:
+    """The request of the run in a folder, which what was asked for must not contradict."""
+    case, options = asked.case, asked.options
+    if options.out is not None and options.out.absolute() != folder.absolute():
+        raise ParameterError(f"--out {options.out} and --resume {folder} are two folders; a run stays in its own")
+    stored = StoredScene.read(folder)
+    if stored.case != case.name:
+        raise OutputError(f"{folder} holds a run of case {stored.case}, not of {case.name}")
+    if options.model not in ("", AUTO, stored.model_choice.get("model")):
+        raise ParameterError(f"--model {options.model} is not that of the run in {folder} "
+                             f"({stored.model_choice.get('model')}); a resumed run keeps its scene")
+    _check_agreement(asked, stored, folder)
+    try:
+        arguments, values = case.from_stored(stored, folder)
+        if others := values.keys() ^ (shared_parameters().keys() - set(NOT_PHYSICS)):
+            raise KeyError(*sorted(others))
+    except KeyError as error:
+        raise OutputError(f"{folder / SCENE} is not the scene of a run: parameter {error}") from None
+    options = replace(options, **values, corridor=corridor_mesh(folder),
+                      kept_mesh=kept_mesh(folder, arguments["mesh"]))
+    return RunRequest(case, arguments, options, stored.model_choice)
+
+
+def _check_agreement(asked: RunRequest, stored: StoredScene, folder: Path) -> None:
+    """Refuse parameters that were asked for and are not those of the run in the folder (ParameterError)."""
+    defaults = {**asked.case.defaults, **Options().parameters()}
+    parameters = stored.parameters_in(folder)
+    for name, value in {**asked.arguments, **asked.options.parameters()}.items():
+        there = parameters.get(name)
+        same = value == there or (name == "mesh" and origin(value) == origin(str(there)))
+        if (name in asked.options.given_names or value != defaults[name]) and not same:
+            raise ParameterError(f"--{name.replace('_', '-')} {value} is not that of the run in {folder} ({there}); "
+                                 f"a resumed run keeps its scene")

@@ -1,0 +1,173 @@
+"""A case: a function that people call, the scene it makes, and its parameters with their units and meanings."""
+
+from __future__ import annotations
+
+import inspect
+import typing
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
+from functools import cache, cached_property
+from pathlib import Path
+from typing import Any
+
+from docstring_parser import parse
+
+from ..errors import MeshError, ParameterError
+from ..system.shipped import data_folder
+from ..units import Unit, number_in
+from .options import OUTSIDE_A_DECK, Options
+from .scene import Scene
+from .stored import StoredScene
+from .tables import TABLES, read_tables
+
+__all__ = ["Case", "CaseParameter", "shared_parameters"]
+
+NEWER = ("merge_nodes",)  # parameters that a scene.toml of an earlier version has not; they take their defaults
+
+
+@dataclass(frozen=True)
+class CaseParameter:
+    """A parameter of a case, as its annotation, its default and its docstring have it.
+
+    Attributes
+    ----------
+    name: in Python and in decks.
+    kind: type of the value.
+    default: of the case function, or of :class:`.Options`.
+    unit: of the number, such as "mm"; "" for pure numbers and what is no number.
+    meaning: one sentence, with unit and range.
+    shared: whether all cases have it (a field of :class:`.Options`), or it belongs to the sample.
+    """
+
+    name: str
+    kind: Any
+    default: Any
+    unit: str
+    meaning: str
+    shared: bool
+
+    @classmethod
+    def of(cls, name: str, annotation: Any, default: Any, meaning: str, *, shared: bool) -> CaseParameter:
+        """The parameter with this annotation, such as `Annotated[float, Unit("mm")]`."""
+        kind, *marks = typing.get_args(annotation)
+        unit = next((mark.symbol for mark in marks if isinstance(mark, Unit)), "")
+        return cls(name, kind, default, unit, meaning, shared)
+
+    @property
+    def has_tables(self) -> bool:
+        """Whether its value is a sequence of tables: grips, tractions, regions."""
+        return self.name in TABLES
+
+    def read(self, value: Any) -> Any:
+        """The value from a deck: text with a unit becomes a number in the unit of the parameter.
+
+        Raises
+        ------
+        ParameterError
+            It is no value of this kind.
+        """
+        if self.has_tables:
+            return read_tables(self.name, value)
+        if self.kind is bool:
+            if not isinstance(value, bool):
+                raise ParameterError(f"{self.name} must be true or false; got {value!r}")
+            return value
+        if self.kind is str:
+            if not isinstance(value, str) or not value.isprintable():
+                is_path = self.name == "mesh" and isinstance(value, str)
+                raise ParameterError(f"{self.name} must be text; got {value!r:.80}" + (
+                    r": for \ in a path write /, or put the path in single quotes" if is_path else ""))
+            return value
+        return number_in(self.name, value, self.unit)
+
+
+@dataclass(frozen=True)
+class Case:
+    """A case: all that the program knows of it.
+
+    Parameters
+    ----------
+    function: that people call; its signature and docstring are the command line and its help.
+    scene: makes the scene from the arguments of the function (all but `options`) and the options.
+    """
+
+    function: Callable[..., Any]
+    scene: Callable[[dict[str, Any], Options], Scene]
+
+    @property
+    def name(self) -> str:
+        """Of the function, its module and its folder in `cases`."""
+        return self.function.__name__
+
+    @property
+    def summary(self) -> str:
+        """What it is, in a sentence."""
+        return parse(self.function.__doc__ or "").short_description or ""
+
+    @property
+    def description(self) -> str:
+        """What it is, in all its sentences."""
+        text = parse(self.function.__doc__ or "")
+        return " ".join(f"{text.short_description or ''} {text.long_description or ''}".split())
+
+    @property
+    def meshes(self) -> tuple[str, ...]:
+        """Names of the meshes that come with the program, in alphabetical order; none where it takes mesh files."""
+        try:
+            return tuple(sorted(path.stem for path in (data_folder(self.name) / "meshes").glob("*.vtu")))
+        except MeshError:
+            return ()
+
+    @cached_property
+    def parameters(self) -> Mapping[str, CaseParameter]:
+        """Every parameter that a deck may have, by name; those of the sample come first."""
+        return {**{p.name: p for p in self.arguments}, **shared_parameters()}
+
+    @cached_property
+    def arguments(self) -> tuple[CaseParameter, ...]:
+        """Those of the sample: the arguments of the function but for `options`."""
+        meanings, signature = _meanings(self.function), inspect.signature(self.function, eval_str=True)
+        return tuple(CaseParameter.of(name, argument.annotation, argument.default, meanings.get(name, ""), shared=False)
+                     for name, argument in signature.parameters.items() if name != "options")
+
+    @property
+    def defaults(self) -> dict[str, Any]:
+        """Default of every parameter."""
+        return {name: parameter.default for name, parameter in self.parameters.items()}
+
+    @property
+    def default_arguments(self) -> dict[str, Any]:
+        """Arguments of the function by default."""
+        return {parameter.name: parameter.default for parameter in self.arguments}
+
+    def divide(self, parameters: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+        """The arguments of the function that are among the parameters, and the rest: values of options."""
+        names = self.default_arguments
+        return ({name: parameters[name] for name in names if name in parameters},
+                {name: value for name, value in parameters.items() if name not in names})
+
+    def from_stored(self, stored: StoredScene, folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:
+        """The arguments of the function and the values of options of the run in a folder.
+
+        Raises
+        ------
+        KeyError
+            An argument of the function is not there.
+        """
+        arguments, values = self.divide(stored.parameters_in(folder))
+        newer = {name: default for name, default in self.default_arguments.items() if name in NEWER}
+        return {name: {**newer, **arguments}[name] for name in self.default_arguments}, values
+
+
+@cache
+def shared_parameters() -> Mapping[str, CaseParameter]:
+    """The parameters that all cases have, by name: the options that a deck may have."""
+    annotations, meanings = typing.get_type_hints(Options, include_extras=True), _meanings(Options)
+    return {f.name: CaseParameter.of(f.name, annotations[f.name], f.default, meanings[f.name], shared=True)
+            for f in fields(Options) if f.name not in OUTSIDE_A_DECK}
+
+
+def _meanings(documented: Any) -> dict[str, str]:
+    """Meaning of each parameter in a docstring, on one line."""
+    described = parse(documented.__doc__ or "").params
+    return {item.arg_name: " ".join((item.description or "").split()) for item in described}
