@@ -15,7 +15,7 @@ from runs import COARSE, Run
 
 from skfsink.errors import OutputError, SkfsinkError
 from skfsink.results import reference
-from skfsink.run.run import SUMMARY
+from skfsink.run.compute import SUMMARY
 from skfsink.scene.stored import SCENE
 from skfsink.system.files import write_atomic
 

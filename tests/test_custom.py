@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from plates import contents, invoke_program, plate
 
-import skfsink.run.run
+import skfsink.run.compute
 from skfsink.cases.custom import CASE, custom
 from skfsink.errors import MeshError, ParameterError, SkfsinkError
 from skfsink.loads.grips import Grip, Ramp, Traction
@@ -44,7 +44,7 @@ GRIPS = '[[grips]]\nboundary = "top"\nx = 0\ny = "1 µm/s"\n[[grips]]\nboundary 
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder with the mesh of the small plate, from which runs draw nothing."""
     write_mesh(tmp_path / "plate.vtu", plate())
-    monkeypatch.setattr(skfsink.run.run, "draw_run", lambda *_: None)
+    monkeypatch.setattr(skfsink.run.compute, "draw_run", lambda *_: None)
     monkeypatch.chdir(tmp_path)
     return tmp_path
 

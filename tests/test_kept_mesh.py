@@ -12,7 +12,7 @@ import pytest
 from bodies import box
 from plates import SMALL, contents, figures, forked, invoke, invoke_program, plate
 
-import skfsink.run.run
+import skfsink.run.compute
 from skfsink.cases.single_edge_notch import single_edge_notch
 from skfsink.meshing import sample as samples
 from skfsink.meshing.kept_mesh import keep_mesh, mesh_name, origin
@@ -29,8 +29,8 @@ NAMES = ("left", "gmsh", "region:1", "a/b", 'with "quotes", commas and <tags>', 
 @pytest.fixture
 def plain(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave out the pictures."""
-    monkeypatch.setattr(skfsink.run.run, "draw_run", lambda *_: None)
-    monkeypatch.setattr(skfsink.run.run, "draw_comparison", lambda *_: None)
+    monkeypatch.setattr(skfsink.run.compute, "draw_run", lambda *_: None)
+    monkeypatch.setattr(skfsink.run.compute, "draw_comparison", lambda *_: None)
 
 
 @pytest.mark.parametrize("kind", ["quad", "hex"])

@@ -358,7 +358,7 @@ def test_a_run_names_the_command(tmp_path: Path) -> None:
 def test_a_run_on_a_converted_mesh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if a converted mesh cannot be run, or its boundaries are not those of the file."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("skfsink.run.run.draw_run", lambda *_: None)
+    monkeypatch.setattr("skfsink.run.compute.draw_run", lambda *_: None)
     write_mesh(tmp_path / "plate.vtu", triangles(mixed=True))
     status, err, out = invoke_program("mesh", "plate.vtu", "ready.vtu", "--length-scale", "0.4")
     assert (status, err) == (0, "") and "128 quadrilaterals" in out and "upper" in out and "notch" in out

@@ -209,7 +209,7 @@ def test_merged_pieces_are_the_whole(tmp_path: Path) -> None:
 def test_merge_nodes_in_a_deck(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if the option of a deck does not reach the mesh, is not kept by the run, or takes another unit."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("skfsink.run.run.draw_run", lambda *_: None)
+    monkeypatch.setattr("skfsink.run.compute.draw_run", lambda *_: None)
     write_mesh(tmp_path / "parts.vtu", beside(grid(2, 3), grid(2, 3, (1, 0))))
     text = ('case = "custom"\n[parameters]\nmesh = "parts.vtu"\nlength_scale = 1\nevent_time = 1e-7\n{}\n[[grips]]\n'
             'boundary = "left"\nx = 0\ny = 0\n[[grips]]\nboundary = "right"\nx = 1e-3\ny = 0\n')

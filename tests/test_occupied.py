@@ -14,7 +14,7 @@ import filelock
 import pytest
 from plates import SMALL, contents, forked, invoke, plate
 
-import skfsink.run.run
+import skfsink.run.compute
 from skfsink.errors import OutputError
 from skfsink.meshing.vtu import write_mesh
 from skfsink.run.occupied import HOLDER, LOCK, occupied
@@ -33,8 +33,8 @@ def mesh(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def plain(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave out the pictures."""
-    monkeypatch.setattr(skfsink.run.run, "draw_run", lambda *_: None)
-    monkeypatch.setattr(skfsink.run.run, "draw_comparison", lambda *_: None)
+    monkeypatch.setattr(skfsink.run.compute, "draw_run", lambda *_: None)
+    monkeypatch.setattr(skfsink.run.compute, "draw_comparison", lambda *_: None)
 
 
 def test_a_second_run_is_refused_while_the_first_one_goes_on(mesh: Path, tmp_path: Path, plain: None) -> None:
@@ -89,7 +89,7 @@ def test_a_lock_leaves_nothing_and_disturbs_nothing(tmp_path: Path) -> None:
     assert contents(tmp_path) == before
     with occupied(tmp_path / "a") as warning:
         assert warning == ""
-        skfsink.run.run._begin(tmp_path / "a", overwrite=False)
+        skfsink.run.compute._begin(tmp_path / "a", overwrite=False)
     assert contents(tmp_path) == {}
 
 

@@ -18,7 +18,7 @@ import pytest
 from plates import SMALL, contents, figures, forked, invoke, plate
 
 import skfsink.run.checkpoint
-import skfsink.run.run
+import skfsink.run.compute
 from skfsink.meshing.kept_mesh import keep_mesh
 from skfsink.meshing.sample import load_sample
 from skfsink.meshing.vtu import write_mesh
@@ -40,8 +40,8 @@ def mesh(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def plain(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave out the pictures."""
-    monkeypatch.setattr(skfsink.run.run, "draw_run", lambda *_: None)
-    monkeypatch.setattr(skfsink.run.run, "draw_comparison", lambda *_: None)
+    monkeypatch.setattr(skfsink.run.compute, "draw_run", lambda *_: None)
+    monkeypatch.setattr(skfsink.run.compute, "draw_comparison", lambda *_: None)
 
 
 def histories(folder: Path) -> dict[str, bytes]:
@@ -116,10 +116,10 @@ def test_interrupted_while_drawing(number: signal.Signals, mesh: Path, tmp_path:
                                    monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if a signal outside of the stepping is a traceback, or a kill without a word."""
     out = tmp_path / "out"
-    monkeypatch.setattr(skfsink.run.run, "draw_run", lambda *_: os.kill(os.getpid(), number))
+    monkeypatch.setattr(skfsink.run.compute, "draw_run", lambda *_: os.kill(os.getpid(), number))
     arguments = ["--mesh", mesh, "--out", out, "--event-time", "1e-6", *SMALL]
     assert forked(arguments) == (130, f"skfsink: interrupted; go on with skfsink resume {out}\n")
-    monkeypatch.setattr(skfsink.run.run, "draw_run", lambda *_: None)
+    monkeypatch.setattr(skfsink.run.compute, "draw_run", lambda *_: None)
     assert forked(["--resume", out, "--quiet"]) == (0, "") and figures(out)["event"]["duration_s"] >= 1e-6
 
 
@@ -170,7 +170,7 @@ def stopped(mesh: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert forked([*short, "--out", top / "run"], 145)[0] == -9
     assert forked([*short, "--out", top / "other", "--phi", "0.2"], 100)[0] == -9
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(skfsink.run.run, "draw_run", lambda *_: None)
+        patch.setattr(skfsink.run.compute, "draw_run", lambda *_: None)
         assert forked([*short, "--out", top / "both", "--analysis", "both"], 275)[0] == -9
     assert (top / "both" / "quasistatic" / "checkpoint.npz").exists()
     return top

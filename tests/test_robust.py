@@ -19,8 +19,8 @@ import pytest
 import skfem
 from plates import SMALL, contents, forked, invoke, plate
 
+import skfsink.run.compute
 import skfsink.run.memory
-import skfsink.run.run
 from skfsink.fem.space import Space
 from skfsink.fields.momentum import Momentum
 from skfsink.meshing.vtu import write_mesh
@@ -129,7 +129,7 @@ def test_a_long_step_is_not_waited_for(mesh: Path, tmp_path: Path, monkeypatch: 
 def test_signals_outside_of_the_steps(place: str, mesh: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if a signal while a run is set up, or between two analyses, is a traceback or loses the first of them."""
     out = tmp_path / "out"
-    owner, name = (skfsink.run.run, "prepare_folder") if place == "lay_out" else (skfsink.run.run, "load_state")
+    owner, name = (skfsink.run.compute, "prepare_folder") if place == "lay_out" else (skfsink.run.compute, "load_state")
     call = getattr(owner, name)
 
     def hit(*arguments: object) -> object:
@@ -137,7 +137,7 @@ def test_signals_outside_of_the_steps(place: str, mesh: Path, tmp_path: Path, mo
         return call(*arguments)
 
     for drawing in ("draw_run", "draw_comparison"):
-        monkeypatch.setattr(skfsink.run.run, drawing, lambda *_: None)
+        monkeypatch.setattr(skfsink.run.compute, drawing, lambda *_: None)
     arguments = ["--mesh", mesh, "--out", out, "--analysis", "both", "--event-time", "1e-6", *SMALL]
     monkeypatch.setattr(owner, name, hit)
     status, text = forked(arguments)
@@ -204,7 +204,7 @@ def test_writing_fails(number: int, after: int, mesh: Path, tmp_path: Path, monk
     """Fails if a file that cannot be written is a traceback, or costs the checkpoint that was there."""
     out = tmp_path / "out"
     arguments = ["--mesh", mesh, "--event-time", "5e-6", "--checkpoint-every", "1e-9", *SMALL]
-    monkeypatch.setattr(skfsink.run.run, "draw_run", lambda *_: None)
+    monkeypatch.setattr(skfsink.run.compute, "draw_run", lambda *_: None)
     with monkeypatch.context() as patch:
         patch.setattr(os, "fsync", tight(os.fsync, after, number))
         status, err, _ = invoke(*arguments, "--out", out)
@@ -232,7 +232,7 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
 def test_a_disk_that_is_full(small_disk: Path, mesh: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if a real disk without room is a traceback, or costs the last checkpoint."""
     out = small_disk / "out"
-    monkeypatch.setattr(skfsink.run.run, "draw_run", lambda *_: None)
+    monkeypatch.setattr(skfsink.run.compute, "draw_run", lambda *_: None)
     arguments = ["--mesh", mesh, "--event-time", "2e-5", "--frame-every", "1e-7", "--record-every", "1e-7",
                  "--checkpoint-every", "0.01", *SMALL]
     status, err = forked([*arguments, "--out", out])
@@ -256,7 +256,7 @@ def test_folders_that_vanish(away: str, mesh: Path, tmp_path: Path, monkeypatch:
         mark(self, *arguments)
 
     monkeypatch.setattr(Observers, "step", moved)
-    monkeypatch.setattr(skfsink.run.run, "draw_run", lambda *_: None)
+    monkeypatch.setattr(skfsink.run.compute, "draw_run", lambda *_: None)
     status, err = forked(["--mesh", mesh, "--out", out, "--event-time", "2e-5", "--frame-every", "1e-6",
                           "--checkpoint-every", "0.01", *SMALL])
     assert status == 2 and err.startswith("skfsink: cannot write ") and "No such file" in err, err

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from plates import SMALL, invoke, plate
 
-import skfsink.run.run
+import skfsink.run.compute
 from skfsink.cases.single_edge_notch import CASE, single_edge_notch
 from skfsink.errors import CheckpointError, MeshError, OutputError, ParameterError, require
 from skfsink.fields.state import State
@@ -50,7 +50,7 @@ def scene(mesh: Path, **options: Any) -> Scene:
 def test_scene_file_is_enough_to_run_again(arguments: list[str], mesh: Path, tmp_path: Path,
                                            monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if a parameter that decides the result is missing from scene.toml, or loses a bit in it."""
-    monkeypatch.setattr(skfsink.run.run, "draw_run", lambda *_: None)
+    monkeypatch.setattr(skfsink.run.compute, "draw_run", lambda *_: None)
     monkeypatch.chdir(tmp_path)  # the mesh is given relative to it
     assert invoke("--mesh", mesh.name, "--out", "first", *SMALL, *arguments)[0] == 0
     parameters = tomllib.loads((tmp_path / "first" / "scene.toml").read_text())["parameters"]

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from plates import invoke_program, plate
 
-import skfsink.run.run
+import skfsink.run.compute
 from skfsink.errors import ParameterError
 from skfsink.material import SinkLaw
 from skfsink.meshing.sample import file_sample
@@ -41,7 +41,7 @@ def beside(name: str, script: str) -> ModuleType:
 
 def loaded(name: str, mesh: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> Result:
     """A deck on one of its meshes at its onset, and some nanoseconds more."""
-    monkeypatch.setattr(skfsink.run.run, "draw_run", lambda *_: None)
+    monkeypatch.setattr(skfsink.run.compute, "draw_run", lambda *_: None)
     text = shipped_decks()[name].read_text()
     text = re.sub(r'(?m)^mesh = "[^"]*"', f'mesh = "{data_folder(name) / "meshes" / mesh}.vtu"', text)
     deck = folder / "deck.toml"
@@ -117,7 +117,7 @@ def test_a_name_stands_for_a_deck(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 def test_commands_take_names(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if `list` leaves a deck out, or `run` and `sweep` do not compute the deck of a name, in its folder."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(skfsink.run.run, "draw_run", lambda *_: None)
+    monkeypatch.setattr(skfsink.run.compute, "draw_run", lambda *_: None)
     status, _, out = invoke_program("list")
     assert status == 0 and all(name in out for name in DECKS)
     for command in (("run", "nothing"), ("sweep", "nothing", "--vary", "m=10")):

@@ -19,7 +19,7 @@ import pytest
 from PIL import Image
 from plates import invoke_program, plate
 
-import skfsink.run.run
+import skfsink.run.compute
 import skfsink.sweep.plan
 from skfsink.errors import OutputError, ParameterError
 from skfsink.meshing.vtu import write_mesh
@@ -257,7 +257,7 @@ def test_a_worker_that_is_killed_loses_nothing_and_repeats_nothing(
 
 def test_a_sweep_goes_on_elsewhere(deck: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if a sweep that was moved is taken for another one, needs the mesh of begun runs, or takes another mesh."""
-    monkeypatch.setattr(skfsink.run.run, "draw_run", lambda *_: None)
+    monkeypatch.setattr(skfsink.run.compute, "draw_run", lambda *_: None)
     here, far = tmp_path / "here", tmp_path / "far"
     here.mkdir(), far.mkdir()
     for name in ("plate.vtu", "scene.toml"):

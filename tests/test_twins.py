@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import skfsink.run.run
+import skfsink.run.compute
 from skfsink import Grip, Options, custom
 from skfsink.meshing.mesh_file import read_mesh_file
 from skfsink.meshing.sample import file_sample
@@ -36,7 +36,7 @@ def history(mesh: Path, out: Path) -> bytes:
 def test_a_file_and_its_twin_in_vtu_give_the_same_bytes(path: Path, tmp_path: Path,
                                                         monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if anything of a mesh but its name depends on the format of its file."""
-    monkeypatch.setattr(skfsink.run.run, "draw_run", lambda *_: None)
+    monkeypatch.setattr(skfsink.run.compute, "draw_run", lambda *_: None)
     twin = tmp_path / f"{path.stem}.vtu"
     write_mesh(twin, read_mesh_file(path))
     one, other = history(path, tmp_path / "one"), history(twin, tmp_path / "other")

@@ -13,7 +13,7 @@ from ..loads.grips import Grip, Traction
 from ..material.regions import Region, RegionLaw
 from ..meshing.sample import file_sample
 from ..results.result import Result
-from ..run.run import run_case
+from ..run.compute import run_case
 from ..scene.case import Case
 from ..scene.options import SAMPLE, Options
 from ..scene.scene import Scene

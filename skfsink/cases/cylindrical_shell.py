@@ -11,7 +11,7 @@ from ..meshing.shapes import check_shell
 from ..meshing.sweeping import rolled, swept, unrolled
 from ..meshing.symmetry import Mirror
 from ..results.result import Result
-from ..run.run import run_case
+from ..run.compute import run_case
 from ..scene.arrange import arrange
 from ..scene.case import Case
 from ..scene.options import SAMPLE, Options

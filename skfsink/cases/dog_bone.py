@@ -13,7 +13,7 @@ from ..meshing.shapes import check_dog_bone
 from ..meshing.sweeping import swept
 from ..meshing.symmetry import Mirror
 from ..results.result import Result
-from ..run.run import run_case
+from ..run.compute import run_case
 from ..scene.arrange import arrange
 from ..scene.case import Case
 from ..scene.options import SAMPLE, Options

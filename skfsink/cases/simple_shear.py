@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from ..loads.grips import Grip
 from ..meshing.shapes import check_plate
 from ..results.result import Result
-from ..run.run import run_case
+from ..run.compute import run_case
 from ..scene.arrange import arrange
 from ..scene.case import Case
 from ..scene.controls import choose

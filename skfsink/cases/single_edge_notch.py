@@ -8,7 +8,7 @@ from ..loads.grips import Grip
 from ..meshing.shapes import check_plate
 from ..meshing.symmetry import Mirror
 from ..results.result import Result
-from ..run.run import run_case
+from ..run.compute import run_case
 from ..scene.arrange import arrange
 from ..scene.case import Case
 from ..scene.options import SAMPLE, Options

@@ -24,6 +24,7 @@ from ..errors import ParameterError
 from ..system.text import read_toml
 from .options import Options
 from .registry import CASES, find_case
+from .scene import Scene
 from .tables import TABLES, tables_beside
 
 __all__ = ["Deck", "read_deck"]
@@ -40,9 +41,17 @@ class Deck:
     parameters: Mapping[str, Any]
 
     def run(self, **output: Any) -> Any:
-        """Run it, to a :class:`.Result`; `output` are the options that say where: out, overwrite, quiet, resume."""
+        """Run it, to a :class:`.Result`; `output` are options that no deck has: out, overwrite, quiet, resume,
+        observers.
+        """
         arguments, options = self.check()
         return find_case(self.case).function(**arguments, options=replace(options, **output))
+
+    def scene(self) -> Scene:
+        """The scene it asks for, with its mesh."""
+        case = find_case(self.case)
+        arguments, options = self.check()
+        return case.scene({**case.default_arguments, **arguments}, options)
 
     def check(self) -> tuple[dict[str, Any], Options]:
         """The arguments of the case function, those of the sample and the options; the latter are checked."""

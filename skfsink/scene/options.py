@@ -29,7 +29,7 @@ from .controls import Controls, choose
 __all__ = ["LAYOUTS", "NOT_PHYSICS", "OUTSIDE_A_DECK", "QUANTITIES", "SAMPLE", "Options"]
 
 #: options that say where a run goes, or are set by the run itself
-OUTSIDE_A_DECK = ("out", "resume", "overwrite", "quiet", "corridor", "kept_mesh", "given_names")
+OUTSIDE_A_DECK = ("out", "resume", "overwrite", "quiet", "observers", "corridor", "kept_mesh", "given_names")
 #: options that are no part of a scene: those, and how its model was chosen
 NOT_PHYSICS = ("model", "tolerance", "quantity", *OUTSIDE_A_DECK)
 LAYOUTS = ("corridor", "uniform", "two-pass")
@@ -165,6 +165,8 @@ class Options:
         Mesh of the body that the run has left in its folder; set by the run.
     given_names
         Names of the options that a command line gave; a resumed run checks that they are its own.
+    observers
+        A user's observers of the run, from Python (:class:`skfsink.run.Observer`).
     """
 
     model: Annotated[str, MODEL] = ""
@@ -214,6 +216,7 @@ class Options:
     corridor: Annotated[Path | None, Parameter(parse=False)] = None
     kept_mesh: Annotated[Path | None, Parameter(parse=False)] = None
     given_names: Annotated[frozenset[str], Parameter(parse=False)] = frozenset()
+    observers: Annotated[tuple[Any, ...], Parameter(parse=False)] = ()
 
     def __post_init__(self) -> None:
         for name in ("out", "resume", "corridor", "kept_mesh"):

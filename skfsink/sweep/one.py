@@ -13,7 +13,7 @@ from pathlib import Path
 from filelock import FileLock
 
 from ..errors import SkfsinkError
-from ..run.run import SUMMARY
+from ..run.compute import SUMMARY
 from ..scene.deck import read_deck
 from ..scene.stored import SCENE
 from ..system.files import reported, write_atomic

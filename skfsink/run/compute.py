@@ -1,13 +1,15 @@
-"""From the arguments of a case function to the files of a run."""
+"""From a scene, or the arguments of a case function, to the files of a run."""
 
 from __future__ import annotations
 
 import logging
 import os
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import replace
+from copy import deepcopy
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -27,17 +29,43 @@ from .checkpoint import load_checkpoint, load_state
 from .checks import refuse
 from .display import Display
 from .memory import check_memory
+from .observers.observer import Observer
 from .occupied import occupied
 from .request import RunRequest, read_request
 from .simulate import Loaded, Simulation
 from .summarize import summarize
 from .two_pass import corridor_report, lay_corridor
 
-__all__ = ["run_case"]
+__all__ = ["run", "run_case"]
 
 log = logging.getLogger(__name__)
 SUMMARY = "summary.json"
 PARTS = ("dynamic", "quasistatic")  # folders of the two runs of both analyses
+
+
+def run(scene: Scene, folder: str | Path, observers: Sequence[Observer] = (), *, resume: bool = False,
+        overwrite: bool = False, quiet: bool = False) -> Result:
+    """Run a scene in a folder.
+
+    Parameters
+    ----------
+    scene: what to compute: made from its parts, by :meth:`.Deck.scene`, or read by :func:`.read_scene`.
+    folder: where its files go.
+    observers: look at the run beside those of every run, or in their place; see :class:`.Observer`. Of two analyses
+        each gets copies of them.
+    resume: go on with the run of this scene in `folder`, which must have had the same observers.
+    overwrite: use a folder that is not empty.
+    quiet: show no progress.
+
+    Raises
+    ------
+    SkfsinkError
+        What is wrong with the scene, the folder or the run, in one line.
+    Interrupted
+        Ctrl-C or SIGTERM; the same call with `resume` goes on.
+    """
+    with Display(quiet) as display:
+        return _compute(scene, _Job(Path(folder), display, resume, tuple(observers)), overwrite)
 
 
 def run_case(case: Case, arguments: dict[str, Any], options: Options) -> Result:
@@ -53,42 +81,63 @@ def run_case(case: Case, arguments: dict[str, Any], options: Options) -> Result:
     request = read_request(case, arguments, options)
     try:
         with Display(options.quiet) as display:
-            return _compute(request, display)
+            if request.model_choice:
+                display.say(request.model_choice["text"])
+            job = _Job(request.folder, display, request.resumes, options.observers, request.notes)
+            return _compute(request.scene(), job, request.options.overwrite, partial(_with_corridor, request))
     except (Interrupted, KeyboardInterrupt):
         begun = (request.folder / SCENE).exists()
         raise Interrupted("interrupted; " + (f"go on with skfsink resume {shlex.quote(str(request.folder))}" if begun
                                              else "nothing was computed yet")) from None
 
 
-def _compute(request: RunRequest, display: Display) -> Result:
-    """Compute what was asked for, in a folder that no other run is in."""
-    folder, both = request.folder, request.options.analysis == "both"
-    if request.model_choice:
-        display.say(request.model_choice["text"])
-    scene = _checked_scene(request, display)
+@dataclass(frozen=True)
+class _Job:
+    """Where a run goes, whether it goes on, who looks at it, and what it has to warn of at its beginning."""
+
+    folder: Path
+    display: Display
+    resumes: bool
+    observers: tuple[Observer, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    def part(self, analysis: str, resumes: bool) -> _Job:
+        """That of one of both analyses, with observers of its own."""
+        return replace(self, folder=self.folder / analysis, resumes=resumes, observers=deepcopy(self.observers))
+
+
+def _compute(scene: Scene, job: _Job, overwrite: bool,
+             with_mesh: Callable[[Scene, Display], Scene] = lambda scene, _: scene) -> Result:
+    """Compute a scene in a folder that no other run is in; `with_mesh` gives it a mesh that is made in this."""
+    folder, both = job.folder, scene.controls.analysis == "both"
+    _check(scene, job)
     folders = [folder, *(folder / part for part in PARTS if both)]
     before = [place for place in folders if place == folder or os.path.isdir(place)]
     with ExitStack() as locks:
-        notes = [*request.notes, *_lock(locks, before)]
-        if not request.resumes:
-            _begin(folder, request.options.overwrite)
-            if request.options.mesh_layout == "two-pass":
-                corridor = lay_corridor(scene, request.arguments, request.options, folder, display)
-                request = replace(request, options=corridor)
-                scene = _checked_scene(request, display)
+        notes = [*job.notes, *_lock(locks, before)]
+        if not job.resumes:
+            _begin(folder, overwrite)
+            remeshed = with_mesh(scene, job.display)
+            if remeshed is not scene:
+                _check(scene := remeshed, job)
         notes += _lock(locks, [place for place in folders if place not in before])
-        if both:
-            return _run_both(scene, folder, display, request.resumes, notes)
-        return _run_one(scene, folder, display, request.resumes, notes=notes)
+        job = replace(job, notes=tuple(filter(None, notes)))
+        return _run_both(scene, job) if both else _run_one(scene, job)
 
 
-def _checked_scene(request: RunRequest, display: Display) -> Scene:
-    """The scene asked for, if it fits into the memory and, of a new run, is such as can be meant."""
-    scene = request.scene()
-    check_memory(scene, display)
-    if not request.resumes:
-        refuse(scene)  # before anything is written
-    return scene
+def _check(scene: Scene, job: _Job) -> None:
+    """Refuse a scene that does not fit into the memory or, of a new run, cannot be meant; nothing is written yet."""
+    check_memory(scene, job.display)
+    if not job.resumes:
+        refuse(scene)
+
+
+def _with_corridor(request: RunRequest, scene: Scene, display: Display) -> Scene:
+    """The scene on the mesh of two passes, if that was asked for."""
+    if request.options.mesh_layout != "two-pass":
+        return scene
+    options = lay_corridor(scene, request.arguments, request.options, request.folder, display)
+    return replace(request, options=options).scene()
 
 
 def _lock(locks: ExitStack, folders: Sequence[Path]) -> list[str]:
@@ -110,24 +159,24 @@ def _write_scene(scene: Scene, folder: Path) -> None:
     scene.stored(MESH).write(folder)
 
 
-def _run_both(scene: Scene, folder: Path, display: Display, resumes: bool, notes: Sequence[str]) -> Result:
+def _run_both(scene: Scene, job: _Job) -> Result:
     """The dynamic and the quasi-static run of a scene, of which the second begins at the onset of the first."""
-    scenes = {analysis: scene.part(analysis) for analysis in PARTS}
-    begun = {analysis: resumes and (folder / analysis / SCENE).exists() for analysis in PARTS}
-    _check_parts({analysis: part for analysis, part in scenes.items() if begun[analysis]}, folder)
-    if not resumes:
+    scenes, folder = {analysis: scene.part(analysis) for analysis in PARTS}, job.folder
+    jobs = {analysis: job.part(analysis, job.resumes and (folder / analysis / SCENE).exists()) for analysis in PARTS}
+    _check_parts({analysis: part for analysis, part in scenes.items() if jobs[analysis].resumes}, folder)
+    if not job.resumes:
         for analysis in PARTS:
             _begin(folder / analysis, overwrite=True)
         _write_scene(scene, folder)
     parts: dict[str, Result] = {}
     onset: Loaded | None = None
     for analysis, part in scenes.items():
-        if not begun[analysis]:
+        if not jobs[analysis].resumes:
             _begin(folder / analysis, overwrite=True)
-        parts[analysis] = _run_one(part, folder / analysis, display, begun[analysis], onset=onset, notes=notes)
+        parts[analysis] = _run_one(part, jobs[analysis], onset)
         if parts[analysis].failed:
             onset = _onset(folder / "dynamic", scenes["dynamic"].fingerprint)
-    return _combined(scene, folder, display, parts)
+    return _combined(scene, job, parts)
 
 
 def _check_parts(scenes: Mapping[str, Scene], folder: Path) -> None:
@@ -138,8 +187,9 @@ def _check_parts(scenes: Mapping[str, Scene], folder: Path) -> None:
             load_state(folder / analysis / Simulation.ONSET, scene.fingerprint)
 
 
-def _combined(scene: Scene, folder: Path, display: Display, parts: Mapping[str, Result]) -> Result:
+def _combined(scene: Scene, job: _Job, parts: Mapping[str, Result]) -> Result:
     """Picture, summary and result of both analyses together."""
+    folder, display = job.folder, job.display
     display.phase("output")
     if all(part.failed for part in parts.values()):
         draw_comparison(parts["dynamic"], parts["quasistatic"], folder)
@@ -156,40 +206,40 @@ def _onset(folder: Path, fingerprint: str) -> Loaded:
     return Loaded(load_state(folder / Simulation.ONSET, fingerprint), memories["observer Strength"])
 
 
-def _run_one(scene: Scene, folder: Path, display: Display, resumes: bool, *, onset: Loaded | None = None,
-             notes: Sequence[str] = ()) -> Result:
+def _run_one(scene: Scene, job: _Job, onset: Loaded | None = None) -> Result:
     """The run of a scene of one analysis, from `onset` on if there is one."""
-    simulation = Simulation(scene, folder, display, resumes)
+    simulation = Simulation(scene, job.folder, job.display, job.resumes, job.observers)
     with simulation.notes:
-        for note in filter(None, notes):
+        for note in job.notes:
             log.warning(note)
-    if not resumes:
+    if not job.resumes:
         simulation.checkpoint()  # from here on the run can be resumed, whenever it is killed
-        _write_scene(scene, folder)
-    _announce(simulation, folder, display)
+        _write_scene(scene, job.folder)
+    _announce(simulation, job)
     state = simulation.run(onset)
-    return _finished(simulation, state, folder, display)
+    return _finished(simulation, state, job)
 
 
-def _announce(simulation: Simulation, folder: Path, display: Display) -> None:
+def _announce(simulation: Simulation, job: _Job) -> None:
     """Say what is computed, and where."""
     scene = simulation.scene
     space = scene.sample.space
     for text in scene.sample.notes:
-        display.say(f"note: {text}")
-    display.say(f"{scene.title}, mesh {scene.sample.name}: {space.n_elements} elements, {int(simulation.free.sum())} + "
-                f"{space.n_nodes} unknowns; {scene.controls.analysis} analysis in {folder}")
+        job.display.say(f"note: {text}")
+    job.display.say(f"{scene.title}, mesh {scene.sample.name}: {space.n_elements} elements, "
+                    f"{int(simulation.free.sum())} + {space.n_nodes} unknowns; {scene.controls.analysis} analysis in "
+                    f"{job.folder}")
 
 
-def _finished(simulation: Simulation, state: State, folder: Path, display: Display) -> Result:
+def _finished(simulation: Simulation, state: State, job: _Job) -> Result:
     """Pictures, summary and result of a run that has come to its end."""
-    scene = simulation.scene
+    scene, folder, display = simulation.scene, job.folder, job.display
     display.phase("output")
     display.update(0.0, "")
     draw_run(scene, folder, "loading" if simulation.unfailed else "run", simulation.frames.moments)
     simulation.costs.lap("output")
     corridor = {}
-    if scene.parameters["mesh_layout"] == "two-pass":
+    if scene.parameters.get("mesh_layout") == "two-pass":
         corridor["corridor"] = corridor_report(simulation, corridor_mesh(folder).parent)  # before the summary: it warns
     summary = {**summarize(scene, simulation), **corridor}
     write_summary(folder / SUMMARY, summary)
