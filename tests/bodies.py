@@ -14,6 +14,7 @@ from skfsink.fields.body import Body
 from skfsink.fields.density import DensitySolver
 from skfsink.fields.momentum import Momentum
 from skfsink.fields.state import State
+from skfsink.loads.nodal import NodalLoads
 from skfsink.loads.schedule import Loading
 from skfsink.material import AAA, Material, SinkLaw
 from skfsink.material.regions import Region
@@ -96,6 +97,27 @@ def patchy(space: Space, seed: int = 2, dead: float = 0.2) -> np.ndarray:
 def held_body(momentum: Momentum, density: DensitySolver, free: np.ndarray, velocity: np.ndarray, **settings) -> Body:
     """A body whose degrees of freedom but `free` (n*dim,) are held, and move at `velocity` (n, dim)."""
     return Body(momentum, density, Loading.steady(momentum.space, free, velocity), **settings)
+
+
+class Weight(NodalLoads):
+    """Body forces that grow at `rate` [MPa/(mm s)] downwards along the last axis, on the elements that bear any."""
+
+    def __init__(self, space: Space, rate: float) -> None:
+        self.space, self._rate, self._time = space, rate, 0.0
+        self.nodes, self.elements = np.arange(space.n_nodes), np.arange(space.n_elements)
+        self.keep(np.ones(space.n_elements, bool))
+
+    def at(self, t: float) -> None:
+        self._time = t
+        self.values = np.zeros_like(self.space.X)
+        self.values[:, -1] = -self._rate * t * self._volume
+
+    def rate(self, t: float) -> float:
+        return self._rate * float(np.ptp(self.space.X[:, -1]))
+
+    def keep(self, alive: np.ndarray) -> None:
+        self._volume = self.space.lump(np.repeat(alive[:, None], self.space.w.shape[1], axis=1).astype(float))
+        self.at(self._time)
 
 
 class Fracture(NamedTuple):

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bodies import box, ends, notched, wavy
+from bodies import Weight, box, ends, notched, wavy
 from guarded import NOTCHED, PLAIN, Stop, simulation
 
 from skfsink.errors import ConvergenceError, Interrupted, MeshError, ParameterError
@@ -431,3 +431,41 @@ def test_scene_in_which_nothing_moves_says_so(tmp_path: Path) -> None:
     assert run.run().phase == "done"
     assert verdict(still, run).startswith("nothing failed: the greatest W/Phi was 0, at ")
     assert verdict(still, run).endswith("the loading ended because nothing moves after load time 0 s")
+
+
+# --- loads of other kinds ---
+@pytest.mark.parametrize("kind", ["quad", "hex"])
+def test_a_hanging_body_bears_its_weight(kind: str) -> None:
+    """Fails if a load of another kind is left out of balance or ledger, alone or beside others: its top holds it."""
+    space = box(kind, 3, 0.1)
+    up = "xyz"[space.dim - 1]
+    grips = (Grip(f"{up}+", (0.0,) * space.dim),)
+    pull = Traction(f"{up}-", (*[0.0] * (space.dim - 1), -1e-3))
+    for tractions, others, force in (((), [Weight(space, 2e-3)], 2e-3), ((pull,), [Weight(space, 2e-3)], 3e-3),
+                                     ((), [Weight(space, 1e-3), Weight(space, 1e-3)], 2e-3)):
+        loading = Loading(space, [(side(space, g.boundary), g) for g in grips],
+                          [(side(space, t.boundary), t) for t in tractions], others)
+        momentum = Momentum(space, AAA(), dead=loading.dead)
+        statics = Statics(Body(momentum, DensitySolver(space, TOUGH), loading))
+        state = State.intact(space)
+        for _ in statics.load(state):
+            if state.grip >= 10.0:
+                break
+        held = momentum.force(state.u)[side(space, f"{up}+")].sum(axis=0)
+        expected = np.zeros(space.dim)
+        expected[-1] = force * state.grip  # a box of side 1
+        np.testing.assert_allclose(held, expected, atol=1e-6 * force * state.grip)
+        assert abs(state.ledger.balance) < 5e-3 * state.ledger.elastic and state.ledger.loads < 0
+
+
+def test_weight_of_failed_elements_is_gone() -> None:
+    """Fails if elements without force still bear a load."""
+    space = box("quad", 4, 0.0)
+    top = side(space, "y+"), Grip("y+", (0.0, 0.0))
+    loading = Loading(space, [top], (), [Weight(space, 1.0), Weight(space, 1.0)])
+    momentum, state = Momentum(space, AAA(), dead=loading.dead), State.intact(space)
+    momentum.set_time(1.0)
+    state.deleted[:4] = True
+    momentum.set_gamma(state.gamma, state.deleted)
+    assert loading.dead is not None
+    assert loading.dead.values.sum() == pytest.approx(-2.0 * (1 - 4 / 16))

@@ -8,11 +8,13 @@ import subprocess
 import sys
 import tomllib
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from bodies import Weight
 from plates import SMALL, invoke, plate
 
 import skfsink.run.compute
@@ -154,16 +156,18 @@ def test_digests_do_not_depend_on_the_process() -> None:
     assert len({digest(value) for value in values}) == len(values)
 
 
-def test_a_checkpoint_of_an_earlier_version_is_known(mesh: Path, tmp_path: Path) -> None:
-    """Fails if a run begun before the fingerprint had its second part cannot go on, or one of another scene can."""
-    base, other = scene(mesh), scene(mesh, phi=0.2)
-    state = State.intact(base.sample.space)
-    save_state(tmp_path / "old.npz", base.fingerprint.partition("-")[0], state)
-    assert load_state(tmp_path / "old.npz", base.fingerprint).step == 0
-    for path, of in (("old.npz", other), ("new.npz", replace(base, material=NeoHookean()))):
-        save_state(tmp_path / "new.npz", base.fingerprint, state)
+def test_a_checkpoint_of_another_scene_is_refused(mesh: Path, tmp_path: Path) -> None:
+    """Fails if a state goes on under another limiter, material or load, or not under its own scene."""
+    base, state = scene(mesh), State.intact(scene(mesh).sample.space)
+    save_state(tmp_path / "state.npz", base.fingerprint, state)
+    assert load_state(tmp_path / "state.npz", base.fingerprint).step == 0
+    heavy, heavier = (replace(base, loads=(partial(Weight, rate=rate),)) for rate in (1e-3, 2e-3))
+    save_state(tmp_path / "heavy.npz", heavy.fingerprint, state)
+    with pytest.raises(CheckpointError, match="another scene"):
+        load_state(tmp_path / "heavy.npz", heavier.fingerprint)
+    for other in (scene(mesh, phi=0.2), replace(base, material=NeoHookean()), heavy):
         with pytest.raises(CheckpointError, match="another scene"):
-            load_state(tmp_path / path, of.fingerprint)
+            load_state(tmp_path / "state.npz", other.fingerprint)
 
 
 def test_parts_are_the_scenes_of_single_runs(mesh: Path) -> None:

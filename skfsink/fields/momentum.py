@@ -11,7 +11,7 @@ from ..errors import ParameterError
 from ..fem import kernels
 from ..fem.pattern import Pattern
 from ..fem.space import Space
-from ..loads.dead_load import DeadLoad
+from ..loads.nodal import NodalLoads
 from ..material import GeneralMaterial, Material
 from ..material.regions import Region, by_element, rest_of
 
@@ -62,7 +62,7 @@ class Momentum:
     """
 
     def __init__(self, space: Space, material: Material, element: str = "jbar", force_floor: float = 1e-3,
-                 threads: int = 1, regions: Sequence[Region] = (), *, dead: DeadLoad | None = None) -> None:
+                 threads: int = 1, regions: Sequence[Region] = (), *, dead: NodalLoads | None = None) -> None:
         if element not in ELEMENTS:
             raise ParameterError(f"element must be one of {', '.join(ELEMENTS)}; got {element!r}")
         check_element(element, space)

@@ -10,18 +10,19 @@ import skfem
 from ..errors import MeshError, ParameterError
 from ..fem.space import Space
 from .grips import Ramp, Traction
+from .nodal import NodalLoads
 
 __all__ = ["DeadLoad"]
 
 
-class DeadLoad:
+class DeadLoad(NodalLoads):
     """Nodal forces f_a = int N_a T dA of tractions T, as far as the material they act on is there.
 
     A traction acts on the facets of the surface all of whose nodes belong to its boundary. The facets of an element
     that has lost its force, at all its Gauss points, bear no load any more.
 
-    Memory: the load time last given to `at` and the elements last given to `keep`; `at`, `keep`, `resultant`,
-    `potential`, `changed` and `effort` are of the loads as these left them.
+    Memory: the load time last given to `at` and the elements last given to `keep`; `resultant` and energies are of the
+    loads as these left them.
 
     Parameters
     ----------
@@ -30,8 +31,6 @@ class DeadLoad:
 
     Attributes
     ----------
-    nodes: at which tractions act, (k,).
-    values: their forces at the time last given to :meth:`at`, (k, dim) [N; N/mm in 2D]; replaced, never changed.
     elements: of the facets, (f,).
 
     Raises
@@ -81,7 +80,7 @@ class DeadLoad:
     def at(self, t: float) -> None:
         """Take the loads of load time `t` [s]."""
         self._time = t
-        self.values: np.ndarray = self._areas.T @ self.traction(t)
+        self.values = self._areas.T @ self.traction(t)
 
     def traction(self, t: float) -> np.ndarray:
         """Tractions at load time `t` [s], (tractions, dim) [MPa]."""
@@ -102,16 +101,3 @@ class DeadLoad:
         full = np.bincount(self._corner, self._weight * (self._owner[self._facet] == number), minlength=self.nodes.size)
         mean: np.ndarray = full @ u[self.nodes] / full.sum()
         return mean
-
-    # --- energy ---
-    def potential(self, u: np.ndarray) -> float:
-        """-f.u of the loads at the displacement `u` (n, dim) [N mm; N mm/mm in 2D]."""
-        return -float(np.vdot(self.values, u[self.nodes]))
-
-    def changed(self, before: np.ndarray, u: np.ndarray) -> float:
-        """Work -u.df of the change of the loads from `before` (k, dim), at the displacement `u` (n, dim)."""
-        return -float(np.vdot(self.values - before, u[self.nodes]))
-
-    def effort(self, before: np.ndarray, du: np.ndarray) -> float:
-        """Trapezoidal work f.du of loads that were `before` (k, dim) on the way `du` (n, dim)."""
-        return 0.5 * float(np.vdot(self.values + before, du[self.nodes]))

@@ -11,6 +11,7 @@ from ..errors import ParameterError
 from ..fem.space import Space
 from .dead_load import DeadLoad
 from .grips import Grip, Ramp, Traction
+from .nodal import NodalLoads, Together
 
 __all__ = ["Loading"]
 
@@ -27,12 +28,14 @@ class Loading:
     ----------
     space: the mesh.
     grips, tractions: each with the nodes of its boundary.
+    others: loads of other kinds.
 
     Attributes
     ----------
     free: (n*dim,) mask of the degrees of freedom that no grip holds.
     knots: ascending, all > 0 [s].
-    dead: the tractions, None if there are none.
+    tractions: as forces at nodes, None if there are none.
+    dead: all dead loads, None if there are none.
 
     Raises
     ------
@@ -44,7 +47,7 @@ class Loading:
     """
 
     def __init__(self, space: Space, grips: Sequence[tuple[np.ndarray, Grip]],
-                 tractions: Sequence[tuple[np.ndarray, Traction]] = ()) -> None:
+                 tractions: Sequence[tuple[np.ndarray, Traction]] = (), others: Sequence[NodalLoads] = ()) -> None:
         self._moves: list[tuple[np.ndarray, int, float | Ramp]] = []
         free = np.ones(space.X.shape, bool)
         holders = np.full(space.X.shape, -1)  # number of the grip that holds a component of a node
@@ -68,12 +71,14 @@ class Loading:
         values = [value for *_, value in self._moves] + [v for _, traction in tractions for v in traction.rate]
         ramps = [value for value in values if isinstance(value, Ramp)]
         self.knots: tuple[float, ...] = tuple(sorted({float(t) for ramp in ramps for t in ramp.times if t > 0}))
-        self.dead = DeadLoad(space, tractions) if tractions else None
+        self.tractions = DeadLoad(space, tractions) if tractions else None
+        loads = [*([self.tractions] if self.tractions is not None else []), *others]
+        self.dead: NodalLoads | None = Together(loads, space.n_nodes) if len(loads) > 1 else loads[0] if loads else None
         self._shape = space.X.shape
         self._steady: np.ndarray | None = None
         if not any(isinstance(value, Ramp) for *_, value in self._moves):
             self._steady = self.velocity(0.0)
-        if tractions:
+        if loads:
             _check_held(space, free)
 
     @classmethod

@@ -6,7 +6,7 @@ import hashlib
 import inspect
 from collections.abc import Iterator, Mapping, Set
 from dataclasses import fields, is_dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -47,6 +47,9 @@ def _pieces(value: Any) -> Iterator[bytes]:
     elif isinstance(value, list | tuple):
         yield b"sequence"
         yield from (digest(item).encode() for item in value)
+    elif isinstance(value, partial):
+        yield b"partial"
+        yield digest([value.func, value.args, value.keywords]).encode()
     elif isinstance(value, type) or (callable(value) and not is_dataclass(value)):
         yield from _code(value)
     else:

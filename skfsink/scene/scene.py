@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -10,8 +9,10 @@ from typing import Any
 import numpy as np
 
 from ..errors import ParameterError
+from ..fem.space import Space
 from ..fields.momentum import check_element
 from ..loads.grips import Grip, Ramp, Traction
+from ..loads.nodal import NodalLoads
 from ..loads.schedule import Loading
 from ..material import Material, SinkLaw
 from ..material.regions import Region, check_lengths, divided
@@ -39,6 +40,7 @@ class Scene:
     sample, material, sink_law: what is computed.
     grips: the reaction of the first one that moves is the load that is reported, along its motion.
     tractions: dead loads; without a grip that moves, the first one is the load that is reported.
+    loads: dead loads of other kinds, each made from the spaces by a function or an object that is called.
     regions: elements of other materials than `material`; no element is in two.
     faces: in three dimensions, the surfaces of a sheet along which a crack runs; they are no edges it arrives at.
     view: azimuth and elevation [degrees] from which pictures show a body in space.
@@ -65,6 +67,7 @@ class Scene:
     sink_law: SinkLaw
     grips: tuple[Grip, ...]
     tractions: tuple[Traction, ...] = ()
+    loads: tuple[Callable[[Space], NodalLoads], ...] = ()
     regions: tuple[Region, ...] = ()
     faces: tuple[str, ...] = ()
     view: tuple[float, float] = (-75.0, 60.0)
@@ -82,9 +85,10 @@ class Scene:
         check_lengths(self.sink_law, self.regions)
         _ = self.parts
         loading = self.loading()
-        if self.controls.start == "rest" and (loading.knots or self.tractions):
-            raise ParameterError("start rest is for grips of constant velocity; this scene has "
-                                 f"{'tractions' if self.tractions else 'ramps'}: take start onset")
+        if self.controls.start == "rest" and (loading.knots or loading.dead):
+            what = "tractions" if self.tractions else "dead loads" if loading.dead else "ramps"
+            raise ParameterError(f"start rest is for grips of constant velocity; this scene has {what}: take start "
+                                 f"onset")
         if self.controls.start == "rest" and loading.speed(0.0) == 0.0:
             raise ParameterError("start rest needs a grip that moves; all of them are still: give one a velocity, or "
                                  "take start onset")
@@ -117,7 +121,8 @@ class Scene:
         """
         nodes = self.sample.nodes
         return Loading(self.sample.space, [(nodes(grip.boundary), grip) for grip in (*self.grips, *self.rollers)],
-                       [(nodes(traction.boundary), traction) for traction in self.tractions])
+                       [(nodes(traction.boundary), traction) for traction in self.tractions],
+                       [make(self.sample.space) for make in self.loads])
 
     def constraints(self) -> tuple[np.ndarray, np.ndarray]:
         """Mask of the free degrees of freedom (n*dim,) and velocity of the held ones at first (n, dim) [mm/s]."""
@@ -151,18 +156,9 @@ class Scene:
 
     @property
     def fingerprint(self) -> str:
-        """Hash of all that decides the results of the run, whatever the scene was made from, and wherever the mesh is.
-
-        It has two parts, the older one of which checkpoints of earlier versions have alone; see :mod:`.checkpoint`.
-        """
+        """Hash of all that decides the results, whatever the scene was made from, and wherever the mesh is."""
         text = replace(self, parameters={**self.parameters, "mesh": ""}, model_choice={}).stored().toml()
-        hashed, space = hashlib.sha256(text.encode()), self.sample.space
-        for array in (space.X, space.conn, *(nodes for _, nodes in sorted(self.sample.boundaries.items()))):
-            hashed.update(array.tobytes())
-        hashed.update(f"{self.grips} {self.rollers} {self.tractions}".encode())
-        for region in self.regions:
-            hashed.update(f"{region.name} {region.material} {region.sink_law}".encode() + region.elements.tobytes())
         controls = replace(self.controls, checkpoint_every=Controls.checkpoint_every)  # a checkpoint changes nothing
-        rest = digest([controls, self.material, self.sink_law, self.regions, self.grips, self.rollers, self.tractions,
-                       self.faces, self.whole, self.sample.boundaries])
-        return f"{hashed.hexdigest()}-{rest}"
+        space = self.sample.space
+        return digest([text, space.X, space.conn, self.sample.boundaries, controls, self.material, self.sink_law,
+                       self.regions, self.grips, self.rollers, self.tractions, self.loads, self.faces, self.whole])

@@ -40,8 +40,8 @@ class Gauge:
         """The load for the `reaction` (n, dim), the force of the body less the dead loads [N; N/mm in 2D]."""
         if self._grip is not None:
             return float((reaction[self._nodes] @ self._direction).sum())
-        dead = self.loading.dead
-        return 0.0 if dead is None else float(dead.resultant(0) @ self._direction)
+        loads = self.loading.tractions
+        return 0.0 if loads is None else float(loads.resultant(0) @ self._direction)
 
     def displacement(self, state: State) -> float:
         """The displacement [mm]."""
@@ -53,12 +53,12 @@ class Gauge:
         return float((u if self._others is None else u - state.u[self._others].mean(axis=0)) @ self._direction)
 
     def _of_traction(self, u: np.ndarray) -> float:
-        dead, tractions = self.loading.dead, self.scene.tractions
-        if dead is None:
+        loads, tractions = self.loading.tractions, self.scene.tractions
+        if loads is None:
             return 0.0
-        moved = dead.mean(0, u)
+        moved = loads.mean(0, u)
         if tractions[-1].boundary != tractions[0].boundary:
-            moved = moved - dead.mean(len(tractions) - 1, u)
+            moved = moved - loads.mean(len(tractions) - 1, u)
         return float(moved @ self._direction)
 
 

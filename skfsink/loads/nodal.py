@@ -1,0 +1,88 @@
+"""Dead loads as forces at nodes, whatever they come from: what the balances ask of a load."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+__all__ = ["NodalLoads", "Together"]
+
+
+class NodalLoads:
+    """Forces at nodes that keep their direction. A new kind of load derives from it and gives `at`, `rate`, `keep`.
+
+    Memory: the load time last given to `at` and the elements last given to `keep`; energies are of the loads as these
+    left them.
+
+    Attributes
+    ----------
+    nodes: at which they act, (k,), each once.
+    values: their forces at the time last given to :meth:`at`, (k, dim) [N; N/mm in 2D]; replaced, never changed.
+    elements: on which they act, (f,); those that have lost their force bear no load any more.
+    """
+
+    nodes: np.ndarray
+    values: np.ndarray
+    elements: np.ndarray
+
+    def at(self, t: float) -> None:
+        """Take the loads of load time `t` [s]."""
+        raise NotImplementedError
+
+    def rate(self, t: float) -> float:
+        """Fastest change from load time `t` on, as of a traction [MPa/s]; it decides on load increments."""
+        raise NotImplementedError
+
+    def keep(self, alive: np.ndarray) -> None:
+        """Let loads act only on those of `elements` that are `alive` (f,)."""
+        raise NotImplementedError
+
+    # --- energy ---
+    def potential(self, u: np.ndarray) -> float:
+        """-f.u of the loads at the displacement `u` (n, dim) [N mm; N mm/mm in 2D]."""
+        return -float(np.vdot(self.values, u[self.nodes]))
+
+    def changed(self, before: np.ndarray, u: np.ndarray) -> float:
+        """Work -u.df of the change of the loads from `before` (k, dim), at the displacement `u` (n, dim)."""
+        return -float(np.vdot(self.values - before, u[self.nodes]))
+
+    def effort(self, before: np.ndarray, du: np.ndarray) -> float:
+        """Trapezoidal work f.du of loads that were `before` (k, dim) on the way `du` (n, dim)."""
+        return 0.5 * float(np.vdot(self.values + before, du[self.nodes]))
+
+
+class Together(NodalLoads):
+    """Several loads at once.
+
+    Memory: that of each of them.
+    """
+
+    def __init__(self, loads: Sequence[NodalLoads], n_nodes: int) -> None:
+        self.loads, self._n_nodes = tuple(loads), n_nodes
+        self.nodes = np.unique(np.concatenate([load.nodes for load in self.loads]))
+        self.elements = np.concatenate([load.elements for load in self.loads])
+        self._add()
+
+    def _add(self) -> None:
+        total = np.zeros((self._n_nodes, self.loads[0].values.shape[1]))
+        for load in self.loads:
+            total[load.nodes] += load.values
+        self.values = total[self.nodes]
+
+    def at(self, t: float) -> None:
+        """Take the loads of load time `t` [s]."""
+        for load in self.loads:
+            load.at(t)
+        self._add()
+
+    def rate(self, t: float) -> float:
+        """Fastest change of one of them [MPa/s]."""
+        return max(load.rate(t) for load in self.loads)
+
+    def keep(self, alive: np.ndarray) -> None:
+        """Let loads act only on those of `elements` that are `alive` (f,)."""
+        ends = np.cumsum([load.elements.size for load in self.loads])
+        for load, part in zip(self.loads, np.split(alive, ends[:-1])):
+            load.keep(part)
+        self._add()
