@@ -95,7 +95,6 @@ def test_the_top_has_what_is_declared() -> None:
     assert len(found) <= MOST_ENTRIES
 
 
-@pytest.mark.xfail(strict=True, reason="scene.stored, report.scenes and study.ladder import cases as well")
 def test_modules_are_found_by_name_in_three_places() -> None:
     """Fails if another module imports what cannot be seen in its source."""
     found = {structure.dotted(file) for file in structure.sources() if structure.dynamic_imports(file)}
