@@ -39,8 +39,8 @@ def run_sweep(path: Path, vary: Sequence[str], out: Path, jobs: int = 1, schedul
     """
     require("jobs", jobs, low=1, high=256, whole=True)
     deck = read_deck(path)
-    known = find_case(deck.case).parameters
-    variations = [read_variation(text, known) for text in vary]
+    case = find_case(deck.case)
+    variations = [read_variation(text, case) for text in vary]
     varied = list(combinations(variations))
     folders = [out / _name(values) for values in varied]
     _lay_out(deck, [_beside(values, path.parent) for values in varied], folders)
