@@ -26,7 +26,7 @@ from .vary import combinations, read_variation
 __all__ = ["run_sweep"]
 
 
-def run_sweep(path: Path, vary: Sequence[str], out: Path, jobs: int = 1, scheduler: str = "", parquet: bool = False,
+def run_sweep(path: Path, vary: Sequence[str], out: Path, *, jobs: int = 1, scheduler: str = "", parquet: bool = False,
               quiet: bool = False) -> list[dict[str, Any]]:
     """Run the deck in `path` for every combination of `vary` (see :func:`.read_variation`); the rows of its table.
 
