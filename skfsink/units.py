@@ -8,11 +8,11 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Annotated, Any, get_args, get_origin
 
 from .errors import ParameterError
 
-__all__ = ["Unit", "in_unit", "number_in"]
+__all__ = ["Unit", "in_unit", "kind_and_unit", "number_in"]
 
 LONGEST = 80  # characters of a quantity
 #: characters as they are typeset, and as they are typed
@@ -32,9 +32,15 @@ COMMA = re.compile(r"\s*[+-]?\d[\d.]*,\d")  # of a decimal number, or between th
 
 @dataclass(frozen=True)
 class Unit:
-    """What a parameter is measured in, as part of its annotation: `side: Annotated[float, Unit("mm")]`."""
+    """What a number is measured in, as part of its annotation: `side: Annotated[float, Unit("mm")]`."""
 
     symbol: str
+
+
+def kind_and_unit(annotation: Any) -> tuple[Any, str]:
+    """The type in an annotation, and its unit; "" if it has none."""
+    kind, *marks = get_args(annotation) if get_origin(annotation) is Annotated else [annotation]
+    return kind, next((mark.symbol for mark in marks if isinstance(mark, Unit)), "")
 
 
 @cache

@@ -34,7 +34,7 @@ from skfsink.results.loader import load
 from skfsink.scene.deck import read_deck
 from skfsink.scene.options import Options
 from skfsink.scene.stored import StoredScene
-from skfsink.scene.tables import grip_from, read_tables, region_from
+from skfsink.scene.tables import grips_of, read_tables, regions_of
 
 HEAD = 'case = "custom"\n[parameters]\nmesh = "plate.vtu"\nlength_scale = 0.6\nevent_time = "5 µs"\n'
 GRIPS = '[[grips]]\nboundary = "top"\nx = 0\ny = "1 µm/s"\n[[grips]]\nboundary = "bottom"\nx = 0\ny = -1e-3\n'
@@ -185,7 +185,7 @@ def test_two_bulk_moduli_are_refused(options: dict[str, Any], said: str) -> None
     with pytest.raises(ParameterError, match=said):
         RegionLaw("r", "gent", "mu = 1, nu = 0.49", bulk_modulus=1.0).laws(Gent(), Options().sink_law())
     with pytest.raises(ParameterError, match="region r: bulk_modulus 1 MPa and the nu"):
-        region_from({"name": "r", "material": "gent", "constants": "nu = 0.4", "bulk_modulus": "1 MPa"})
+        regions_of([{"name": "r", "material": "gent", "constants": "nu = 0.4", "bulk_modulus": "1 MPa"}])
 
 
 def test_engineering_constants_of_aaa() -> None:
@@ -224,7 +224,7 @@ def test_tables_keep_what_they_say(tmp_path: Path) -> None:
     """Fails if a grip, traction or region changes in being written and read, or units are misread."""
     grips = read_tables("grips", [{"boundary": "top", "x": 0, "z": [["1 min", "1 cm"], [120, 20]]}])
     assert grips == ({"boundary": "top", "x": 0.0, "z": [[0.0, 0.0], [60.0, 10.0], [120.0, 20.0]]},)
-    assert grip_from(grips[0]) == Grip("top", (0.0, None, Ramp((60.0, 120.0), (10.0, 20.0))))
+    assert grips_of(grips, 3)[0] == Grip("top", (0.0, None, Ramp((60.0, 120.0), (10.0, 20.0))))
     assert read_tables("tractions", [{"boundary": "a", "y": "10 kPa/s"}]) == ({"boundary": "a", "y": 0.01},)
     region = {"name": "core", "material": "gent", "constants": "mu = 1 MPa", "phi": "500 kPa", "density": "1 g/cm^3"}
     assert read_tables("regions", [region]) == (region | {"phi": 0.5, "density": 1000.0},)

@@ -124,7 +124,7 @@ def test_commands_are_understood(line: str, capsys: pytest.CaptureFixture[str], 
     help_ = said_of(line, capsys)
     for option, value in zip(words, [*words[1:], ""]):
         assert not option.startswith("--") or re.search(rf"{option}\b", help_), option
-        assert option != "--vary" or read_variation(value, find_case("single_edge_notch").parameters)
+        assert option != "--vary" or read_variation(value, find_case("single_edge_notch"))
 
 
 # --- messages ---

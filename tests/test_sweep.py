@@ -31,7 +31,7 @@ from skfsink.sweep.plan import run_sweep
 from skfsink.sweep.table import draw, read_rows, read_units, write_csv, write_parquet
 from skfsink.sweep.vary import combinations, read_variation
 
-KNOWN = find_case("single_edge_notch").parameters
+CASE = find_case("single_edge_notch")
 
 
 @pytest.fixture
@@ -53,9 +53,9 @@ def deck(tmp_path: Path) -> Path:
     ("m=5,10", "m", [5, 10]), ("deletion=1e-9,1e-3", "deletion", [1e-9, 1e-3])])
 def test_variations(text: str, name: str, values: list[object]) -> None:
     """Fails if a range, a list or a unit is read otherwise than documented, or whole numbers become others."""
-    found, read = read_variation(text, KNOWN)
+    found, read = read_variation(text, CASE)
     assert (found, read) == (name, pytest.approx(values) if isinstance(values[0], float) else values)
-    assert KNOWN[name].kind is not int or all(isinstance(value, int) for value in read)
+    assert CASE.parameters[name].kind is not int or all(isinstance(value, int) for value in read)
 
 
 @pytest.mark.parametrize(("text", "said"), [
@@ -66,7 +66,7 @@ def test_variations(text: str, name: str, values: list[object]) -> None:
 def test_what_cannot_vary(text: str, said: str) -> None:
     """Fails if a mistake passes, or the line does not say what is meant."""
     with pytest.raises(ParameterError) as error:
-        read_variation(text, KNOWN)
+        read_variation(text, CASE)
     assert said in str(error.value)
 
 

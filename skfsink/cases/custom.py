@@ -17,7 +17,7 @@ from ..run.compute import run_case
 from ..scene.case import Case
 from ..scene.options import SAMPLE, Options
 from ..scene.scene import Scene
-from ..scene.tables import TABLES, grip_from, grips_of, read_tables, region_from, traction_from, tractions_of
+from ..scene.tables import grips_of, read_tables, regions_of, tractions_of
 from ..units import Unit
 
 __all__ = ["custom"]
@@ -70,9 +70,9 @@ def custom(
     """
     if options.model:
         raise ParameterError(f"model is for the cases of the paper, whose models were measured; got {options.model!r}")
-    tables = {name: read_tables(name, [item if isinstance(item, Mapping) else TABLES[name][1](item) for item in items])
-              for name, items in (("grips", grips), ("tractions", tractions), ("regions", regions))}
-    arguments = {"mesh": str(mesh), "title": title, "faces": faces, "merge_nodes": merge_nodes, **tables}
+    arguments = {"mesh": str(mesh), "title": title, "faces": faces, "merge_nodes": merge_nodes,
+                 "grips": read_tables("grips", grips), "tractions": read_tables("tractions", tractions),
+                 "regions": read_tables("regions", regions)}
     return run_case(CASE, arguments, options)
 
 
@@ -89,14 +89,14 @@ def _scene(arguments: dict[str, Any], options: Options) -> Scene:
             raise ParameterError(f"{name} is for the cases of the paper; the mesh file {arguments['mesh']} is as it is")
     sample = file_sample(Path(arguments["mesh"]), arguments.get("merge_nodes", 0.0))
     material, sink_law = options.stored_energy(), options.sink_law()
-    laws = [region_from(table) for table in arguments["regions"]]
-    regions = tuple(Region(law.name, sample.elements(law.name), *law.laws(material, sink_law)) for law in laws)
+    regions = tuple(Region(law.name, sample.elements(law.name), *law.laws(material, sink_law))
+                    for law in regions_of(arguments["regions"]))
     dim = sample.space.dim
     return Scene(
         case="custom", title=arguments["title"], parameters={**arguments, **options.parameters()}, sample=sample,
         material=material, sink_law=sink_law, controls=options.controls(), regions=regions,
-        grips=grips_of([grip_from(table) for table in arguments["grips"]], dim),
-        tractions=tractions_of([traction_from(table) for table in arguments["tractions"]], dim),
+        grips=grips_of(arguments["grips"], dim),
+        tractions=tractions_of(arguments["tractions"], dim),
         faces=tuple(filter(None, (name.strip() for name in arguments["faces"].split(",")))))
 
 

@@ -38,4 +38,5 @@ def sweep(deck: Path, *, vary: Annotated[list[str], Parameter(negative="", consu
     from ..system.shipped import deck_name, deck_path
 
     path = deck_path(deck)
-    run_sweep(path, vary, out or Path("results") / "sweep" / deck_name(path), jobs, scheduler, parquet, quiet)
+    run_sweep(path, vary, out or Path("results") / "sweep" / deck_name(path), jobs=jobs, scheduler=scheduler,
+              parquet=parquet, quiet=quiet)

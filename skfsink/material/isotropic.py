@@ -110,7 +110,7 @@ class NeoHookean(Material):
 
     law = staticmethod(_neo_hookean_law)
 
-    mu: float = 1.234
+    mu: float = 2 * AAA.c1
 
     def __post_init__(self) -> None:
         super().__post_init__()

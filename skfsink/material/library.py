@@ -11,6 +11,7 @@ from .base import Material
 from .fibres import HolzapfelGasserOgden
 from .general import MooneyRivlin
 from .isotropic import AAA, ArrudaBoyce, Gent, NeoHookean, Yeoh
+from .sink import SinkLaw
 
 __all__ = ["LIMITERS", "MATERIALS", "Limiter", "material_from"]
 
@@ -30,8 +31,8 @@ class Limiter:
 
 _TRELOAR = "assumed: strength in uniaxial tension at a stretch of 7.6, where Treloar's curve ends"
 LIMITERS: dict[str, Limiter] = {
-    "aaa": Limiter(0.1686, 10.0, "the paper, Sec. 4"),
-    "neo-hookean": Limiter(0.1686, 10.0, "that of aaa"),
+    "aaa": Limiter(SinkLaw.phi, SinkLaw.m, "the paper, Sec. 4"),
+    "neo-hookean": Limiter(SinkLaw.phi, SinkLaw.m, "that of aaa"),
     "yeoh": Limiter(82.0, 10.0, "attributed to Volokh, Mech. Res. Commun. 37 (2010) 684-689, unverified"),
     "mooney-rivlin": Limiter(11.36, 10.0, _TRELOAR),
     "gent": Limiter(15.62, 10.0, _TRELOAR),

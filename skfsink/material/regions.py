@@ -9,10 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from ..errors import ParameterError
+from ..units import Unit
 from . import LIMITERS, Material, SinkLaw, material_of, own_constants
 
 __all__ = ["Region", "RegionLaw", "by_element", "check_lengths", "divided", "rest_of"]
@@ -108,10 +110,10 @@ class RegionLaw:
     name: str
     material: str = "aaa"
     constants: str = ""
-    phi: float = 0.0
+    phi: Annotated[float, Unit("MPa")] = 0.0
     m: float = 0.0
-    bulk_modulus: float = 0.0
-    density: float = 0.0
+    bulk_modulus: Annotated[float, Unit("MPa")] = 0.0
+    density: Annotated[float, Unit("kg/m^3")] = 0.0
 
     def laws(self, material: Material, sink_law: SinkLaw) -> tuple[Material, SinkLaw]:
         """Material and sink law of the region, in a body of these."""

@@ -64,7 +64,7 @@ class HHTControls:
     dt_least: float = 1e-13
     coupling: str = "iterated"
     mass: str = "lumped"
-    mass_floor: float = 1e-3
+    mass_floor: float = ExplicitControls.mass_floor
     force_tolerance: float = 1e-3
     correction_tolerance: float = 2e-3
     gamma_tolerance: float = 1e-2

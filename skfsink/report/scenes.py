@@ -10,8 +10,7 @@ from ..results.loader import Run
 from ..scene.case import CaseParameter, shared_parameters
 from ..scene.options import Options
 from ..scene.registry import CASES, find_case
-from ..scene.stored import SCENE
-from ..scene.tables import TABLES
+from ..scene.stored import SCENE, TABLES
 from .tables import EMPTY, Row, Table
 
 __all__ = ["command_line", "differences", "meanings", "parameter_table", "run_labels"]

@@ -8,17 +8,19 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from docstring_parser import parse
 
-from ..errors import MeshError, ParameterError
+from ..errors import MeshError
 from ..system.shipped import data_folder
-from ..units import Unit, number_in
+from ..units import kind_and_unit
 from .options import OUTSIDE_A_DECK, Options
 from .scene import Scene
-from .stored import StoredScene
-from .tables import TABLES, read_tables
+from .stored import TABLES, StoredScene
+
+if TYPE_CHECKING:
+    from .typed import Mistake, Record
 
 __all__ = ["Case", "CaseParameter", "shared_parameters"]
 
@@ -49,36 +51,13 @@ class CaseParameter:
     @classmethod
     def of(cls, name: str, annotation: Any, default: Any, meaning: str, *, shared: bool) -> CaseParameter:
         """The parameter with this annotation, such as `Annotated[float, Unit("mm")]`."""
-        kind, *marks = typing.get_args(annotation)
-        unit = next((mark.symbol for mark in marks if isinstance(mark, Unit)), "")
+        kind, unit = kind_and_unit(annotation)
         return cls(name, kind, default, unit, meaning, shared)
 
     @property
     def has_tables(self) -> bool:
         """Whether its value is a sequence of tables: grips, tractions, regions."""
         return self.name in TABLES
-
-    def read(self, value: Any) -> Any:
-        """The value from a deck: text with a unit becomes a number in the unit of the parameter.
-
-        Raises
-        ------
-        ParameterError
-            It is no value of this kind.
-        """
-        if self.has_tables:
-            return read_tables(self.name, value)
-        if self.kind is bool:
-            if not isinstance(value, bool):
-                raise ParameterError(f"{self.name} must be true or false; got {value!r}")
-            return value
-        if self.kind is str:
-            if not isinstance(value, str) or not value.isprintable():
-                is_path = self.name == "mesh" and isinstance(value, str)
-                raise ParameterError(f"{self.name} must be text; got {value!r:.80}" + (
-                    r": for \ in a path write /, or put the path in single quotes" if is_path else ""))
-            return value
-        return number_in(self.name, value, self.unit)
 
 
 @dataclass(frozen=True)
@@ -140,6 +119,33 @@ class Case:
         """Arguments of the function by default."""
         return {parameter.name: parameter.default for parameter in self.arguments}
 
+    @cached_property
+    def _record(self) -> Record:
+        from .typed import Record, Text, number  # only decks need them
+
+        texts = {str: Text, bool: bool}
+        return Record({name: texts.get(p.kind, number(p.unit)) for name, p in self.parameters.items()
+                       if not p.has_tables}, _message)
+
+    def read(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """Values of parameters from a deck: text with a unit becomes a number in the unit of the parameter.
+
+        Raises
+        ------
+        ParameterError
+            There is no such parameter, or it has no such value.
+        """
+        from .tables import read_tables
+
+        plain = self._record.read({name: value for name, value in values.items() if name not in self.tables})
+        tables = {name: read_tables(name, values[name]) for name in self.tables if name in values}
+        return {name: {**plain, **tables}[name] for name in values}
+
+    @property
+    def tables(self) -> tuple[str, ...]:
+        """Names of the parameters that are tables."""
+        return tuple(p.name for p in self.arguments if p.has_tables)
+
     def divide(self, parameters: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
         """The arguments of the function that are among the parameters, and the rest: values of options."""
         names = self.default_arguments
@@ -157,6 +163,14 @@ class Case:
         arguments, values = self.divide(stored.parameters_in(folder))
         newer = {name: default for name, default in self.default_arguments.items() if name in NEWER}
         return {name: {**newer, **arguments}[name] for name in self.default_arguments}, values
+
+
+def _message(mistake: Mistake, values: Mapping[str, Any]) -> str:
+    if mistake.kind == "extra_forbidden":
+        return f"{mistake.field!r} is no parameter; `skfsink show CASE` lists them"
+    if mistake.field == "mesh" and isinstance(mistake.value, str):
+        return mistake.text + r": for \ in a path write /, or put the path in single quotes"
+    return mistake.text
 
 
 @cache

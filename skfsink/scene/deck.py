@@ -25,7 +25,7 @@ from ..system.text import read_toml
 from .options import Options
 from .registry import CASES, find_case
 from .scene import Scene
-from .tables import TABLES, tables_beside
+from .stored import TABLES, tables_beside
 
 __all__ = ["Deck", "read_deck"]
 
@@ -93,18 +93,12 @@ def _deck(data: Mapping[str, Any]) -> Deck:
     """The deck in the content of a file."""
     name, parameters = data.get("case"), data.get("parameters", {})
     case = find_case(name) if isinstance(name, str) and name in CASES else None
-    tables = [p.name for p in case.arguments if p.has_tables] if case else []
-    top = (*TOP, *tables)
+    top = (*TOP, *(case.tables if case else ()))
     if unknown := [key for key in data if key not in top]:
         raise ParameterError(f"{unknown[0]!r} is none of {', '.join(top)}")
     if not isinstance(name, str) or not isinstance(parameters, dict):
         raise ParameterError(f"case must be a name, one of {', '.join(CASES)}, and parameters a table")
-    known = (case or find_case(name)).parameters
-    if twice := parameters.keys() & TABLES.keys():
+    case = case or find_case(name)  # which says what there is
+    if twice := parameters.keys() & {*TABLES}:
         raise ParameterError(f"{min(twice)} are tables beside the parameters: [[{min(twice)}]]")
-    read = {}
-    for key, value in {**parameters, **{table: data.get(table, ()) for table in tables}}.items():
-        if key not in known:
-            raise ParameterError(f"{key!r} is no parameter; `skfsink show CASE` lists them")
-        read[key] = known[key].read(value)
-    return Deck(name, read)
+    return Deck(name, case.read({**parameters, **{table: data.get(table, ()) for table in case.tables}}))

@@ -172,43 +172,43 @@ class Options:
     model: Annotated[str, MODEL] = ""
     tolerance: Annotated[float, MODEL] = 0.05
     quantity: Annotated[str, MODEL] = "U"
-    start: Annotated[str, MODEL] = "onset"
+    start: Annotated[str, MODEL] = Controls.start
     half: Annotated[bool, MODEL_FLAG] = False
     dimensions: Annotated[int, MODEL] = 0
     mesh_layout: Annotated[str, MODEL] = "corridor"
-    active_zone: Annotated[bool, MODEL_FLAG] = True
+    active_zone: Annotated[bool, MODEL_FLAG] = Controls.active_zone
     material: Annotated[str, MATERIAL] = "aaa"
-    c1: Annotated[float, MATERIAL, Unit("MPa")] = 0.617
-    c2: Annotated[float, MATERIAL, Unit("MPa")] = 1.215
+    c1: Annotated[float, MATERIAL, Unit("MPa")] = AAA.c1
+    c2: Annotated[float, MATERIAL, Unit("MPa")] = AAA.c2
     constants: Annotated[str, MATERIAL] = ""
-    bulk_modulus: Annotated[float, MATERIAL, Unit("MPa")] = 500.0
-    density: Annotated[float, MATERIAL, Unit("kg/m^3")] = 1433.0
+    bulk_modulus: Annotated[float, MATERIAL, Unit("MPa")] = AAA.bulk_modulus
+    density: Annotated[float, MATERIAL, Unit("kg/m^3")] = AAA.density
     phi: Annotated[float, SINK, Unit("MPa")] = 0.0
-    m: Annotated[float, SINK, Parameter(name=["--m"])] = 10.0
-    length_scale: Annotated[float, SINK, Unit("mm")] = 0.1
-    sink: Annotated[str, SINK] = "lumped"
-    deletion: Annotated[float, SINK] = 1e-6
-    force_floor: Annotated[float, SINK] = 1e-3
+    m: Annotated[float, SINK, Parameter(name=["--m"])] = SinkLaw.m
+    length_scale: Annotated[float, SINK, Unit("mm")] = SinkLaw.length_scale
+    sink: Annotated[str, SINK] = Controls.sink
+    deletion: Annotated[float, SINK] = Controls.deletion
+    force_floor: Annotated[float, SINK] = Controls.force_floor
     speed: Annotated[float, LOADING, Unit("mm/s")] = 1e-3
-    overshoot: Annotated[float, LOADING] = 0.005
-    analysis: Annotated[str, ANALYSIS] = "dynamic"
-    integrator: Annotated[str, ANALYSIS] = "explicit"
-    front: Annotated[float, ANALYSIS] = 0.8
-    element: Annotated[str, ANALYSIS] = "jbar"
-    event_time: Annotated[float, ANALYSIS, Unit("s")] = 2e-4
-    aftermath: Annotated[float, ANALYSIS, Unit("s")] = 1e-5
-    courant: Annotated[float, EXPLICIT] = 0.8
-    gamma_every: Annotated[int, EXPLICIT] = 0
-    mass_floor: Annotated[float, EXPLICIT] = 1e-3
-    hht_alpha: Annotated[float, HHT] = -0.05
-    hht_dt: Annotated[float, HHT, Unit("s")] = 1.6e-7
-    coupling: Annotated[str, HHT] = "iterated"
-    mass: Annotated[str, HHT] = "lumped"
-    balance_tolerance: Annotated[float, CONTROLS] = 0.05
-    record_every: Annotated[float, CONTROLS, Unit("s")] = 1e-6
-    frame_every: Annotated[float, CONTROLS, Unit("s")] = 5e-6
-    checkpoint_every: Annotated[float, CONTROLS, Unit("s")] = 20.0
-    threads: Annotated[int, CONTROLS] = 0
+    overshoot: Annotated[float, LOADING] = Controls.overshoot
+    analysis: Annotated[str, ANALYSIS] = Controls.analysis
+    integrator: Annotated[str, ANALYSIS] = Controls.integrator
+    front: Annotated[float, ANALYSIS] = StaticsControls.front
+    element: Annotated[str, ANALYSIS] = Controls.element
+    event_time: Annotated[float, ANALYSIS, Unit("s")] = Controls.event_time
+    aftermath: Annotated[float, ANALYSIS, Unit("s")] = Controls.aftermath
+    courant: Annotated[float, EXPLICIT] = ExplicitControls.courant
+    gamma_every: Annotated[int, EXPLICIT] = ExplicitControls.gamma_every
+    mass_floor: Annotated[float, EXPLICIT] = ExplicitControls.mass_floor
+    hht_alpha: Annotated[float, HHT] = HHTControls.alpha
+    hht_dt: Annotated[float, HHT, Unit("s")] = HHTControls.dt
+    coupling: Annotated[str, HHT] = HHTControls.coupling
+    mass: Annotated[str, HHT] = HHTControls.mass
+    balance_tolerance: Annotated[float, CONTROLS] = Controls.balance_tolerance
+    record_every: Annotated[float, CONTROLS, Unit("s")] = Controls.record_every
+    frame_every: Annotated[float, CONTROLS, Unit("s")] = Controls.frame_every
+    checkpoint_every: Annotated[float, CONTROLS, Unit("s")] = Controls.checkpoint_every
+    threads: Annotated[int, CONTROLS] = Controls.threads
     out: Annotated[Path | None, OUTPUT] = None
     resume: Annotated[Path | None, OUTPUT] = None
     overwrite: Annotated[bool, OUTPUT, FLAG] = False
@@ -271,14 +271,13 @@ class Options:
 
     def controls(self) -> Controls:
         """How to compute."""
+        shared = {f.name: getattr(self, f.name) for f in fields(Controls)
+                  if f.name not in ("explicit", "hht", "statics")}
         return Controls(
-            self.analysis, self.integrator, self.sink, self.element, self.overshoot, self.deletion, self.force_floor,
-            self.event_time, self.aftermath, self.record_every, self.frame_every, self.balance_tolerance,
-            self.checkpoint_every, self.threads, self.start, self.active_zone,
-            ExplicitControls(self.courant, self.gamma_every, self.mass_floor),
-            HHTControls(self.hht_alpha, self.hht_dt, coupling=self.coupling, mass=self.mass,
-                        mass_floor=self.mass_floor),
-            StaticsControls(front=self.front))
+            **shared, explicit=ExplicitControls(self.courant, self.gamma_every, self.mass_floor),
+            hht=HHTControls(self.hht_alpha, self.hht_dt, coupling=self.coupling, mass=self.mass,
+                            mass_floor=self.mass_floor),
+            statics=StaticsControls(front=self.front))
 
     def parameters(self) -> dict[str, Any]:
         """The options that decide results, by name; the energy limiter is that of the law where it was 0.

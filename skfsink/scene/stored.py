@@ -14,11 +14,12 @@ from ..errors import OutputError
 from ..meshing.kept_mesh import MESH
 from ..system.files import reported, write_atomic
 from ..system.text import read_toml
-from .tables import TABLES, tables_beside
 
-__all__ = ["CORRIDOR", "SCENE", "StoredScene", "corridor_mesh", "kept_mesh"]
+__all__ = ["CORRIDOR", "SCENE", "TABLES", "StoredScene", "corridor_mesh", "kept_mesh", "tables_beside"]
 
 SCENE, CORRIDOR = "scene.toml", "corridor.vtu"
+#: parameters that are tables, which stand beside the table `parameters` of a file
+TABLES = ("grips", "tractions", "regions")
 HEAD = ("# A run of skfsink. Run it again with: skfsink run scene.toml\n"
         "# Plain numbers are in N, mm, MPa and s; density in kg/m^3.\n")
 
@@ -57,7 +58,7 @@ class StoredScene:
         try:
             with reported(f"cannot read {path}"):
                 document = read_toml(path)
-            tables = TABLES if TABLES.keys() & document.keys() else ()
+            tables = TABLES if document.keys() & {*TABLES} else ()
             return cls(str(document["case"]),
                        {**document["parameters"], **{name: document.get(name, ()) for name in tables}},
                        str(document.get("source", "")), tuple(map(str, document.get("assumed", ()))),
@@ -85,6 +86,12 @@ class StoredScene:
     def parameters_given(self) -> dict[str, Any]:
         """The parameters, with the mesh file that was given to the run, not the copy it keeps."""
         return {**self.parameters, **({"mesh": self.source} if self.source else {})}
+
+
+def tables_beside(parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """Parameters as a file has them: numbers and text in the table `parameters`, and beside it each kind of tables."""
+    tables = {name: [dict(table) for table in parameters[name]] for name in TABLES if parameters.get(name)}
+    return {"parameters": {name: value for name, value in parameters.items() if name not in TABLES}, **tables}
 
 
 def kept_mesh(folder: Path, mesh: str) -> Path | None:

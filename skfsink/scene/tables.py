@@ -9,156 +9,132 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from typing import Any
+from functools import partial
+from typing import Annotated, Any, get_type_hints
 
-from ..errors import ParameterError, require
+from pydantic import AfterValidator, Discriminator, Field, Tag, ValidationInfo
+
+from ..errors import ParameterError
 from ..loads.grips import Grip, Ramp, Traction
 from ..material import MATERIALS, own_constants
 from ..material.regions import RegionLaw, one_bulk_modulus
-from ..units import number_in
+from ..units import kind_and_unit
+from .typed import Mistake, Record, Text, number
 
-__all__ = ["TABLES", "grip_from", "grips_of", "read_tables", "region_from", "tables_beside",
-           "traction_from", "tractions_of"]
+__all__ = ["grips_of", "read_tables", "regions_of", "tractions_of"]
 
 AXES = ("x", "y", "z")
 MOST = 1000  # tables of a kind, points of a ramp
 
 
-# --- reading ---
-def _table(kind: str, table: Any, needed: str, known: Sequence[str]) -> Mapping[str, Any]:
-    """A table of a deck that has no other keys than those known."""
-    if not isinstance(table, Mapping):
-        raise ParameterError(f"{kind} must be tables; got {table!r:.80}")
-    for key in table:
-        if key not in known:
-            raise ParameterError(f"{kind}: {key!r} is none of {', '.join(known)}")
-    if not isinstance(table.get(needed), str) or not table[needed].isprintable():
-        raise ParameterError(f"{kind}: {needed} must be a name; got {table.get(needed)!r:.80}")
-    return table
-
-
-def _number(name: str, value: Any, unit: str) -> float:
-    return require(name, number_in(name, value, unit), unit)
-
-
-def _course(name: str, value: Any, rate: str, unit: str) -> float | Ramp:
-    """A number in the unit `rate`, or a ramp of points [time, value in `unit`]."""
-    if not isinstance(value, list | tuple):
-        return _number(name, value, rate)
-    if len(value) > MOST or not all(isinstance(point, list | tuple) and len(point) == 2 for point in value):
-        raise ParameterError(f"{name}: a ramp has 2 to {MOST} points [time, value]; got {value!r:.80}")
-    times, values = (tuple(_number(name, point[i], of) for point in value) for i, of in enumerate(("s", unit)))
+def _ramp(points: list[tuple[float, float]], info: ValidationInfo) -> list[list[float]]:
     try:
-        return Ramp(times, values)
+        return _plain(Ramp(*zip(*points)) if points else Ramp((), ()))
     except ParameterError as error:
-        raise ParameterError(f"{name}: {error}") from None
+        raise ValueError(f"{info.field_name}: {error}") from None
 
 
-def grip_from(table: Any) -> Grip:
-    """The grip of a table; a component that is not there is free."""
-    table = _table("grips", table, "boundary", ("boundary", *AXES))
-    name = table["boundary"]
-    return Grip(name, tuple(_course(f"grip {name}, {axis}", table[axis], "mm/s", "mm") if axis in table else None
-                            for axis in AXES))
+def _course(rate: str, unit: str) -> Any:
+    """Type of a component: a number in the unit `rate`, or a ramp of points [time, value in `unit`]."""
+    time, value = number("s", finite=True), number(unit, finite=True)
+    point = Annotated[tuple[time, value], Field(strict=False)]  # type: ignore[valid-type]
+    ramp = Annotated[list[point], Field(strict=False, max_length=MOST), AfterValidator(_ramp)]
+    either = Annotated[number(rate, finite=True), Tag("rate")] | Annotated[ramp, Tag("ramp")]  # type: ignore[valid-type, misc]
+    return Annotated[either, Discriminator(lambda course: "ramp" if isinstance(course, list | tuple) else "rate")]
 
 
-def traction_from(table: Any) -> Traction:
-    """The traction of a table; a component that is not there is zero."""
-    table = _table("tractions", table, "boundary", ("boundary", *AXES))
-    name = table["boundary"]
-    return Traction(name, tuple(_course(f"traction {name}, {axis}", table[axis], "MPa/s", "MPa") if axis in table
-                                else 0.0 for axis in AXES))
+def _message(kind: str, mistake: Mistake, table: Any) -> str:
+    key, field = next(iter(TYPES[kind])), mistake.field
+    if not field:
+        return f"{kind} must be tables; got {table!r:.80}"
+    if mistake.kind == "extra_forbidden":
+        return f"{kind}: {field!r} is none of {', '.join(TYPES[kind])}"
+    if field == key:
+        return f"{kind}: {key} must be a name; got {table.get(key)!r:.80}"
+    where = f"{kind.removesuffix('s')} {table[key]}, "
+    if mistake.kind in ("value_error", "string_type"):
+        return where + mistake.text
+    return f"{where}{field}: a ramp has 2 to {MOST} points [time, value]; got {table[field]!r:.80}"
 
 
-def region_from(table: Any) -> RegionLaw:
-    """What a region is made of, from a table."""
-    units = {"phi": "MPa", "m": "", "bulk_modulus": "MPa", "density": "kg/m^3"}
-    table = _table("regions", table, "name", ("name", "material", "constants", *units))
-    name = table["name"]
-    texts: dict[str, Any] = {key: table[key] for key in ("material", "constants") if key in table}
-    for key, value in texts.items():
-        if not isinstance(value, str) or not value.isprintable():
-            raise ParameterError(f"region {name}: {key} must be text; got {value!r:.80}")
-    if (law := texts.get("material", "aaa")) not in MATERIALS:
-        raise ParameterError(f"region {name}: material must be one of {', '.join(MATERIALS)}; got {law!r}")
-    numbers: dict[str, Any] = {key: _number(f"region {name}, {key}", table[key], unit)
-                               for key, unit in units.items() if key in table}
-    try:
-        text, bulk = own_constants(law, texts.get("constants", ""))
-        one_bulk_modulus(bulk, numbers.get("bulk_modulus"))
-    except ParameterError as error:
-        raise ParameterError(f"region {name}: {error}") from None
-    if text:
-        texts["constants"] = text
-    if bulk is not None:
-        numbers["bulk_modulus"] = bulk
-    return RegionLaw(name, **texts, **numbers)
+#: the fields of a table of each kind; the first names it, and those left out are free, zero, or as in the body
+TYPES: Mapping[str, Mapping[str, Any]] = {
+    "grips": {"boundary": Text, **dict.fromkeys(AXES, _course("mm/s", "mm"))},
+    "tractions": {"boundary": Text, **dict.fromkeys(AXES, _course("MPa/s", "MPa"))},
+    "regions": {name: Text if hint is str else number(kind_and_unit(hint)[1], finite=True)
+                for name, hint in get_type_hints(RegionLaw, include_extras=True).items()}}
+RECORDS = {kind: Record(types, partial(_message, kind), [next(iter(types))]) for kind, types in TYPES.items()}
 
 
-def grips_of(grips: Sequence[Grip], dim: int) -> tuple[Grip, ...]:
-    """Grips with as many components as the body has dimensions; missing ones are free."""
-    return tuple(Grip(grip.boundary, _fitted("grip", grip.boundary, grip.velocity, dim, None)) for grip in grips)
-
-
-def tractions_of(tractions: Sequence[Traction], dim: int) -> tuple[Traction, ...]:
-    """Tractions with as many components as the body has dimensions; missing ones are zero."""
-    return tuple(Traction(t.boundary, _fitted("traction", t.boundary, t.rate, dim, 0.0)) for t in tractions)
-
-
-def _fitted(kind: str, name: str, components: Sequence[Any], dim: int, nothing: Any) -> tuple[Any, ...]:
-    components = (*components, *[nothing] * (dim - len(components)))
-    if any(component not in (None, 0.0) for component in components[dim:]):
-        raise ParameterError(f"{kind} {name} has a component z, and the mesh is plane")
-    return components[:dim]
-
-
-# --- writing ---
-def _plain(course: float | Ramp) -> Any:
-    if isinstance(course, Ramp):
-        return [[float(t), float(value)] for t, value in zip(course.times, course.values)]
-    return float(course)
-
-
-def grip_table(grip: Grip) -> dict[str, Any]:
-    """The table of a grip, in plain numbers."""
-    return {"boundary": grip.boundary,
-            **{axis: _plain(value) for axis, value in zip(AXES, grip.velocity) if value is not None}}
-
-
-def traction_table(traction: Traction) -> dict[str, Any]:
-    """The table of a traction, in plain numbers."""
-    return {"boundary": traction.boundary, **{axis: _plain(rate) for axis, rate in zip(AXES, traction.rate)
-                                              if isinstance(rate, Ramp) or rate}}
-
-
-def region_table(region: RegionLaw) -> dict[str, Any]:
-    """The table of a region, in plain numbers."""
-    return {key: value for key, value in asdict(region).items() if value or key in ("name", "material")}
-
-
-#: tables of a deck by name: how one is read, and how one is written
-TABLES: dict[str, tuple[Callable[[Any], Any], Callable[[Any], dict[str, Any]]]] = {
-    "grips": (grip_from, grip_table), "tractions": (traction_from, traction_table),
-    "regions": (region_from, region_table)}
-
-
-def read_tables(name: str, value: Any) -> tuple[dict[str, Any], ...]:
-    """The tables of that name, with plain numbers in place of text with units.
+def read_tables(kind: str, tables: Any) -> tuple[dict[str, Any], ...]:
+    """The tables of a kind, with plain numbers in place of text with units; each may also be the object it stands for.
 
     Raises
     ------
     ParameterError
         They are no such tables; the message says which and why.
     """
-    if not isinstance(value, list | tuple) or len(value) > MOST:
-        raise ParameterError(f"{name} must be tables [[{name}]], at most {MOST}; got {value!r:.80}")
-    read, write = TABLES[name]
-    return tuple(write(read(table)) for table in value)
+    if not isinstance(tables, list | tuple) or len(tables) > MOST:
+        raise ParameterError(f"{kind} must be tables [[{kind}]], at most {MOST}; got {tables!r:.80}")
+    read = [RECORDS[kind].read(_table(table)) for table in tables]
+    if kind == "regions":
+        return tuple(map(_with_constants, read))
+    return tuple({name: course for name, course in table.items() if kind == "grips" or course != 0.0} for table in read)
 
 
-def tables_beside(parameters: Mapping[str, Any]) -> dict[str, Any]:
-    """Parameters as a deck has them: numbers and text in the table `parameters`, and beside it each kind of tables."""
-    tables = {name: [dict(table) for table in parameters[name]] for name in TABLES if parameters.get(name)}
-    return {"parameters": {name: value for name, value in parameters.items() if name not in TABLES}, **tables}
+def _with_constants(table: Mapping[str, Any]) -> dict[str, Any]:
+    """The table of a region, with the constants that E, G and nu stand for."""
+    law = RegionLaw(**table)
+    if law.material not in MATERIALS:
+        raise ParameterError(f"region {law.name}: material must be one of {', '.join(MATERIALS)}; got {law.material!r}")
+    try:
+        constants, bulk_modulus = own_constants(law.material, law.constants)
+        one_bulk_modulus(bulk_modulus, table.get("bulk_modulus"))
+    except ParameterError as error:
+        raise ParameterError(f"region {law.name}: {error}") from None
+    return _table(RegionLaw(**{**table, **({"constants": constants} if constants else {}),
+                               **({} if bulk_modulus is None else {"bulk_modulus": bulk_modulus})}))
+
+
+# --- objects and their tables ---
+def _table(item: Any) -> Any:
+    """The table of a grip, a traction or a region; anything else as it is."""
+    if isinstance(item, Grip):
+        return {"boundary": item.boundary, **{axis: _plain(v) for axis, v in zip(AXES, item.velocity) if v is not None}}
+    if isinstance(item, Traction):
+        return {"boundary": item.boundary, **{axis: _plain(v) for axis, v in zip(AXES, item.rate) if v != 0.0}}
+    if isinstance(item, RegionLaw):
+        return {name: value for name, value in asdict(item).items() if value or name in ("name", "material")}
+    return item
+
+
+def _plain(course: float | Ramp) -> Any:
+    if isinstance(course, Ramp):
+        return [[float(time), float(value)] for time, value in zip(course.times, course.values)]
+    return float(course)
+
+
+def grips_of(tables: Sequence[Mapping[str, Any]], dim: int) -> tuple[Grip, ...]:
+    """The grips of a body of that dimension from their tables."""
+    return tuple(Grip(table["boundary"], _components("grip", table, dim, None))
+                 for table in read_tables("grips", tables))
+
+
+def tractions_of(tables: Sequence[Mapping[str, Any]], dim: int) -> tuple[Traction, ...]:
+    """The tractions on a body of that dimension from their tables."""
+    return tuple(Traction(table["boundary"], _components("traction", table, dim, 0.0))
+                 for table in read_tables("tractions", tables))
+
+
+def regions_of(tables: Sequence[Mapping[str, Any]]) -> tuple[RegionLaw, ...]:
+    """What regions are made of, from their tables."""
+    return tuple(RegionLaw(**table) for table in read_tables("regions", tables))
+
+
+def _components(kind: str, table: Mapping[str, Any], dim: int, missing: float | None) -> tuple[Any, ...]:
+    courses = [table.get(axis, missing) for axis in AXES]
+    if any(course not in (None, 0.0) for course in courses[dim:]):
+        raise ParameterError(f"{kind} {table['boundary']} has a component z, and the mesh is plane")
+    return tuple(Ramp(*zip(*course)) if isinstance(course, list) else course for course in courses[:dim])

@@ -26,7 +26,7 @@ from .vary import combinations, read_variation
 __all__ = ["run_sweep"]
 
 
-def run_sweep(path: Path, vary: Sequence[str], out: Path, jobs: int = 1, scheduler: str = "", parquet: bool = False,
+def run_sweep(path: Path, vary: Sequence[str], out: Path, *, jobs: int = 1, scheduler: str = "", parquet: bool = False,
               quiet: bool = False) -> list[dict[str, Any]]:
     """Run the deck in `path` for every combination of `vary` (see :func:`.read_variation`); the rows of its table.
 
@@ -39,8 +39,8 @@ def run_sweep(path: Path, vary: Sequence[str], out: Path, jobs: int = 1, schedul
     """
     require("jobs", jobs, low=1, high=256, whole=True)
     deck = read_deck(path)
-    known = find_case(deck.case).parameters
-    variations = [read_variation(text, known) for text in vary]
+    case = find_case(deck.case)
+    variations = [read_variation(text, case) for text in vary]
     varied = list(combinations(variations))
     folders = [out / _name(values) for values in varied]
     _lay_out(deck, [_beside(values, path.parent) for values in varied], folders)
