@@ -122,6 +122,8 @@ class Options:
         Quasi-static: a pass fails the points with at least this share of the greatest stored energy, in [0, 1].
     element
         "jbar" (element-constant J̄), "plain" (standard Q1, locks) or "planestress" (thin sheet with free faces, in 2D).
+    kernels
+        What evaluates the weak forms: "compiled" (element loops) or "forms" (scikit-fem, for small meshes).
     event_time
         Longest dynamic event [s], > 0.
     aftermath
@@ -195,6 +197,7 @@ class Options:
     integrator: Annotated[str, ANALYSIS] = "explicit"
     front: Annotated[float, ANALYSIS] = 0.8
     element: Annotated[str, ANALYSIS] = "jbar"
+    kernels: Annotated[str, ANALYSIS] = "compiled"
     event_time: Annotated[float, ANALYSIS, Unit("s")] = 2e-4
     aftermath: Annotated[float, ANALYSIS, Unit("s")] = 1e-5
     courant: Annotated[float, EXPLICIT] = 0.8
@@ -274,7 +277,7 @@ class Options:
         return Controls(
             self.analysis, self.integrator, self.sink, self.element, self.overshoot, self.deletion, self.force_floor,
             self.event_time, self.aftermath, self.record_every, self.frame_every, self.balance_tolerance,
-            self.checkpoint_every, self.threads, self.start, self.active_zone,
+            self.checkpoint_every, self.threads, self.start, self.active_zone, self.kernels,
             ExplicitControls(self.courant, self.gamma_every, self.mass_floor),
             HHTControls(self.hht_alpha, self.hht_dt, coupling=self.coupling, mass=self.mass,
                         mass_floor=self.mass_floor),

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import ParameterError
+from ..fem.backends import backend
 from ..fields.momentum import check_element
 from ..loads.grips import Grip, Ramp, Traction
 from ..loads.schedule import Loading
@@ -79,6 +80,7 @@ class Scene:
         for boundary in (load.boundary for group in (self.grips, self.rollers, self.tractions) for load in group):
             self.sample.nodes(boundary)
         check_element(self.controls.element, self.sample.space)
+        backend(self.controls.kernels).check(self.sample.space)
         check_lengths(self.sink_law, self.regions)
         _ = self.parts
         loading = self.loading()
