@@ -165,6 +165,6 @@ class Scene:
         for region in self.regions:
             hashed.update(f"{region.name} {region.material} {region.sink_law}".encode() + region.elements.tobytes())
         controls = replace(self.controls, checkpoint_every=Controls.checkpoint_every)  # a checkpoint changes nothing
-        rest = digest([controls, self.material, self.sink_law, self.regions, self.grips, self.rollers, self.tractions,
-                       self.faces, self.whole, self.sample.boundaries])
+        rest = digest([controls, tuple(backend(controls.kernels)), self.material, self.sink_law, self.regions,
+                       self.grips, self.rollers, self.tractions, self.faces, self.whole, self.sample.boundaries])
         return f"{hashed.hexdigest()}-{rest}"
