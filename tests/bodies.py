@@ -152,7 +152,7 @@ def momentum_of(space: Space, material: Material, gamma: np.ndarray, element: st
     """The momentum balance at the relative density `gamma` (ne, nq) of the Gauss points."""
     momentum = Momentum(space, material, element, regions=regions, threads=threads)
     momentum.gamma = gamma
-    momentum.tiles.set_gamma(gamma)
+    momentum.backend.set_gamma(gamma)
     return momentum
 
 

@@ -154,7 +154,8 @@ def test_help_shows_every_flag_with_unit_and_range(columns: str, monkeypatch: py
     status, err, out = invoke("--help")
     assert (status, err) == (0, "") and max(map(cell_len, out.splitlines())) <= int(columns)
     text = " ".join(out.replace("│", " ").split())
-    flags = {name.replace("_", "-") for name in Options.__dataclass_fields__} - {"given-names", "corridor", "kept-mesh", "observers"}
+    inner = {"given-names", "corridor", "kept-mesh", "observers"}
+    flags = {name.replace("_", "-") for name in Options.__dataclass_fields__} - inner
     flags |= {"side", "notch", "notch-width", "mesh", "mesh-seed", "help", "version"}
     after = {flag: text.partition(f"--{flag} ")[2].partition(" --")[0] for flag in flags}
     assert all(after.values()), [flag for flag, found in after.items() if not found]

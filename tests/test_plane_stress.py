@@ -44,7 +44,7 @@ def sheet(space: Space, gamma: np.ndarray | float = 1.0, material: Material | No
     """Momentum balance in plane stress with the densities `gamma` (ne, nq) set directly at the Gauss points."""
     momentum = Momentum(space, material or AAA(), "planestress")
     momentum.gamma = np.broadcast_to(gamma, space.w.shape).copy()
-    momentum.tiles.set_gamma(momentum.gamma)
+    momentum.backend.set_gamma(momentum.gamma)
     return momentum
 
 
@@ -91,6 +91,29 @@ def test_force_energy_and_tangent_equal_the_forms(material: Material):
     K = Pattern(space, 2).matrix(momentum.tangent(Pattern(space, 2), u))
     close(K, forms.tangent.assemble(basis, **fields))
     assert abs(K - K.T).max() <= ROUNDING * abs(K).max()
+
+
+@both_materials
+def test_the_forms_are_those_of_a_solid_with_free_faces(material: Material):
+    """Fails if the forms, which take W(t, j), have another stress or condensed modulus than F in space with P33 = 0."""
+    space = box("quad", 5)
+    u, gamma = wavy(space, 0.25), patchy(space)
+    F = material.thin_sheet(np.eye(2) + space.gradient(u))
+    A = material.modulus(F)
+    A = (A[..., :2, :2, :2, :2]
+         - np.einsum("...iJ,...kL->...iJkL", A[..., :2, :2, 2, 2], A[..., 2, 2, :2, :2]) / A[..., 2:, 2:, 2:, 2:])
+    weight, forms, basis = space.w * gamma, plane_stress_forms(material), space.u_basis
+    force = np.einsum("eq,eqiJ,eqaJ->eai", weight, material.first_piola(F)[..., :2, :2], space.dN)
+    tangent = np.einsum("eq,eqaJ,eqiJkL,eqbL->eaibk", weight, space.dN, A, space.dN)
+    fields = {"displacement": u.ravel(), "gamma": gamma}
+    close(forms.residual.assemble(basis, **fields),
+          np.bincount(space.element_dofs.ravel(), force.ravel()))
+    soft = np.where(gamma < kernels.SOFT_GAMMA, kernels.ERSATZ_STIFFNESS * material.shear_modulus, 0.0)
+    tangent += np.einsum("eq,eqaJ,eqbJ,ik->eaibk", space.w * soft, space.dN, space.dN, np.eye(2))
+    dofs = space.element_dofs
+    K = np.zeros((u.size, u.size))
+    np.add.at(K, (dofs[:, :, None], dofs[:, None, :]), tangent.reshape(len(dofs), 8, 8))
+    close(forms.tangent.assemble(basis, **fields).toarray(), K)
 
 
 # --- derivatives ---

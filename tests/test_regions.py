@@ -141,8 +141,8 @@ def test_a_body_divided_in_name_only_is_the_same(kind: str, element: str) -> Non
                         momentum.tangent(pattern, u), momentum.tangent(pattern, u, convex=True),
                         cauchy_stress(momentum, u), momentum.consistent_mass(pattern), np.array([taken]),
                         np.array([momentum.energy]), np.array([momentum.stiffest(u, inverse)]),
-                        np.array([momentum.tiles.mean_force()])])
-        tiles = momentum.tiles
+                        np.array([momentum.backend.mean_force()])])
+        tiles = momentum.backend
         np.testing.assert_array_equal(tiles.untile(tiles.tile(space.w)), space.w)
     for one, two in zip(*results):
         close(two, one, 1e-13)
@@ -159,7 +159,7 @@ def test_the_indicator_takes_the_stiffest_part() -> None:
     for part, own in zip(parts, elements):
         gamma = np.zeros_like(space.w)
         gamma[own] = 1.0
-        part.tiles.set_gamma(gamma)
+        part.backend.set_gamma(gamma)
         greatest.append(part.stiffest(0 * ones, ones))
     assert momentum.stiffest(0 * ones, ones) == pytest.approx(max(greatest), rel=1e-12)
     assert greatest[1] > 1.3 * greatest[0]

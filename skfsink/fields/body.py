@@ -51,10 +51,10 @@ class Body:
         """The body of a :class:`.Scene`."""
         controls, space, loading = scene.controls, scene.sample.space, scene.loading()
         threads = controls.workers(space.dim)
-        momentum = Momentum(space, scene.material, controls.element, controls.force_floor, threads, scene.regions,
-                            dead=loading.dead)
+        momentum = Momentum(space, scene.material, controls.element, controls.force_floor, threads,
+                            regions=scene.regions, dead=loading.dead, kernels=controls.kernels)
         density = DensitySolver(space, scene.sink_law, controls.sink, active_zone=controls.active_zone,
-                                regions=scene.regions)
+                                regions=scene.regions, kernels=controls.kernels)
         return cls(momentum, density, loading, controls.deletion, threads)
 
     @property

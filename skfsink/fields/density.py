@@ -18,8 +18,8 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from ..errors import ConvergenceError, ParameterError
-from ..fem import kernels
 from ..fem.amg import AmgCG
+from ..fem.backends import backend
 from ..fem.direct import Factorization
 from ..fem.pattern import Pattern
 from ..fem.space import Space
@@ -67,6 +67,7 @@ class DensitySolver:
     unchanged: a solve is left out when no sink coefficient moved by more than this, relatively, since the last one.
     active_zone: solves with a tolerance of their own are made where gamma changes (see :mod:`.active_zone`).
     regions: elements with limiters of their own; the length l and epsilon are those of `law`.
+    kernels: what evaluates the weak forms, a name in :data:`.BACKENDS`.
 
     Attributes
     ----------
@@ -76,8 +77,9 @@ class DensitySolver:
     fallbacks: solves in which AMG-CG did not converge and the matrix was factorised instead.
     """
 
-    def __init__(self, space: Space, law: SinkLaw, sink: str = "lumped", tolerance: float = 1e-8,
-                 unchanged: float = 1e-12, active_zone: bool = True, regions: Sequence[Region] = ()) -> None:
+    def __init__(self, space: Space, law: SinkLaw, sink: str = "lumped", *, tolerance: float = 1e-8,
+                 unchanged: float = 1e-12, active_zone: bool = True, regions: Sequence[Region] = (),
+                 kernels: str = "compiled") -> None:
         if sink not in SINKS:
             raise ParameterError(f"sink must be one of {', '.join(SINKS)}; got {sink!r}")
         self.space, self.law, self.sink = space, law, sink
@@ -89,8 +91,9 @@ class DensitySolver:
         self.phi = phi[:, None] if isinstance(phi, np.ndarray) else phi
         self.failure_energy = by_element(ne, law.failure_energy, regions, lambda region: region.sink_law.failure_energy)
         self.pattern = Pattern(space)
+        self.backend = backend(kernels).density(space, law.length_scale)
         self.load = self._lump(np.ones_like(space.w))
-        self._laplacian = kernels.laplacian(space, self.pattern, law.length_scale**2)
+        self._laplacian = self.backend.laplacian(self.pattern)
         self._data, self._laplacian_diagonal = self._laplacian.copy(), self._laplacian[self.pattern.diagonal]
         self._direct: Factorization | None = None
         self._amg = AmgCG(self.pattern.matrix(self._assemble(np.ones_like(space.w))), tolerance)
@@ -172,7 +175,7 @@ class DensitySolver:
 
     def _assemble(self, sink: np.ndarray) -> np.ndarray:
         if self.sink == "consistent":
-            return self._laplacian + kernels.weighted_mass(self.space, self.pattern, sink)
+            return self._laplacian + self.backend.sink(self.pattern, sink)
         self._data[self.pattern.diagonal] = self._laplacian_diagonal + self._lump(sink)
         return self._data  # one array for all solves: only the diagonal changes
 
@@ -180,7 +183,7 @@ class DensitySolver:
         """Nodal sums (n,) of Gauss point values; of sink and load alike, so that H = 1 gives gamma = 1."""
         if self.sink == "nearest":
             return np.bincount(self.space.conn.ravel(), (self.space.w * values).ravel(), self.space.n_nodes)
-        return self.space.lump(values)
+        return self.backend.lump(values)
 
     def _factorise(self, data: np.ndarray) -> np.ndarray:
         """Direct solve, on the matrix scaled to a unit diagonal: its entries span fifteen decades."""

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
 from ..errors import ParameterError
-from ..fem import kernels
+from ..fem.backend import ELEMENTS, Part
+from ..fem.backends import backend
 from ..fem.pattern import Pattern
 from ..fem.space import Space
 from ..loads.nodal import NodalLoads
@@ -17,21 +17,11 @@ from ..material.regions import Region, by_element, rest_of
 
 __all__ = ["ELEMENTS", "Momentum", "Part", "check_element"]
 
-ELEMENTS = ("jbar", "plain", "planestress")
-
 
 def check_element(element: str, space: Space) -> None:
     """Refuse an element that is not made for the dimension of `space` (ParameterError)."""
     if element == "planestress" and space.dim == 3:
         raise ParameterError("element planestress is for meshes of quadrilaterals; this one has hexahedra: take jbar")
-
-
-class Part(NamedTuple):
-    """Elements of one material: their numbers (None: the whole body), and the directions of their fibres, if any."""
-
-    material: Material
-    elements: np.ndarray | None
-    fibres: np.ndarray | None
 
 
 class Momentum:
@@ -48,11 +38,13 @@ class Momentum:
     force_floor: Gauss points with gamma below this exert no force. Their stiffness and mass are then gone together.
     threads: that share the loops over elements; results do not depend on their number.
     regions: elements of other materials.
+    kernels: what evaluates the weak forms, a name in :data:`.BACKENDS`.
     dead: dead loads, if there are any, at the load time last given to :meth:`set_time`; `force` is less them.
 
     Attributes
     ----------
     parts: the body by its materials.
+    backend: what evaluates the weak forms.
     rho0: density of the intact solid [t/mm^3], a number, or where materials differ one for each element (ne, 1).
     shear_moduli, shear_wave_speeds: least and greatest of the materials [MPa; m/s].
     energy: gamma-weighted stored energy at the last evaluation [N mm; N mm/mm in 2D].
@@ -62,18 +54,16 @@ class Momentum:
     """
 
     def __init__(self, space: Space, material: Material, element: str = "jbar", force_floor: float = 1e-3,
-                 threads: int = 1, regions: Sequence[Region] = (), *, dead: NodalLoads | None = None) -> None:
+                 threads: int = 1, *, regions: Sequence[Region] = (), dead: NodalLoads | None = None,
+                 kernels: str = "compiled") -> None:
         if element not in ELEMENTS:
             raise ParameterError(f"element must be one of {', '.join(ELEMENTS)}; got {element!r}")
         check_element(element, space)
-        self.space, self.material, self.force_floor = space, material, force_floor
-        self.j_bar = element == "jbar"
+        self.space, self.material, self.element, self.force_floor = space, material, element, force_floor
         self.plane_stress = element == "planestress"
         self.parts = self._divide(regions)
         materials = [part.material for part in self.parts]
-        self._laws = [kernels.Law(m.compiled_law, m.constants, m.bulk_modulus) for m in materials]
-        self.tiles = kernels.Tiles(space, self.plane_stress, threads,
-                                   [(part.elements, part.fibres) for part in self.parts])
+        self.backend = backend(kernels).momentum(space, self.parts, element, threads=threads)
         moduli, speeds = [m.shear_modulus for m in materials], [m.shear_wave_speed for m in materials]
         self.shear_moduli, self.shear_wave_speeds = (min(moduli), max(moduli)), (min(speeds), max(speeds))
         rho0 = by_element(space.n_elements, material.rho0, regions, lambda region: region.material.rho0)
@@ -84,7 +74,7 @@ class Momentum:
         self.evaluations = 0
         self._intact = self._lumped(np.ones_like(space.w))
         self._gamma: np.ndarray | None = np.ones_like(space.w)
-        self.tiles.set_gamma(self._gamma)
+        self.backend.set_gamma(self._gamma)
 
     def _divide(self, regions: Sequence[Region]) -> list[Part]:
         """The body by its materials; without regions it is one part, all elements in their order."""
@@ -106,7 +96,7 @@ class Momentum:
     def gamma(self) -> np.ndarray:
         """Effective relative density at the Gauss points, zero in deleted elements and below the floor, (ne, nq)."""
         if self._gamma is None:
-            self._gamma = self.tiles.untile(self.tiles.gamma)
+            self._gamma = self.backend.untile(self.backend.gamma)
         return self._gamma
 
     @gamma.setter
@@ -129,7 +119,7 @@ class Momentum:
         if self.dead is not None:
             nodes, e = self.space.conn[self.dead.elements], self.dead.elements
             self.dead.keep(((gamma[nodes] @ self.space.N.T >= self.force_floor) & ~deleted[e, None]).any(axis=1))
-        return self.tiles.relax(gamma, deleted, self.force_floor)
+        return self.backend.relax(gamma, deleted, self.force_floor)
 
     def set_time(self, t: float) -> None:
         """Use the dead loads of load time `t` [s] from now on."""
@@ -147,8 +137,8 @@ class Momentum:
         Sets `energy`, `loads`, `least_J` and `W`.
         """
         out = np.empty_like(self.space.X) if out is None else out
-        self.least_J = self.tiles.force(self.space.X + u, self._laws, out, self.j_bar)
-        self.energy = float(self.tiles.psi.sum())
+        self.least_J = self.backend.force(u, out)
+        self.energy = self.backend.energy
         if self.dead is not None:
             out[self.dead.nodes] -= self.dead.values
             self.loads = self.dead.potential(u)
@@ -158,23 +148,11 @@ class Momentum:
     @property
     def W(self) -> np.ndarray:
         """Stored energy density of the undamaged material at the last evaluation [MPa], (ne, nq)."""
-        return self.tiles.untile(self.tiles.W)
+        return self.backend.untile(self.backend.W)
 
     def tangent(self, pattern: Pattern, u: np.ndarray, convex: bool = False) -> np.ndarray:
         """Data of the tangent stiffness at `u` on `pattern`; with `convex` one that is positive at every point."""
-        data, *others = (self._tangent(part, pattern, u, convex) for part in self.parts)
-        for other in others:
-            data += other
-        return data
-
-    def _tangent(self, part: Part, pattern: Pattern, u: np.ndarray, convex: bool) -> np.ndarray:
-        material, elements, fibres = part
-        if self.plane_stress:
-            return kernels.tangent_plane_stress(self.space, pattern, material, u, self.gamma, convex, elements)
-        if isinstance(material, GeneralMaterial) and fibres is not None:
-            return kernels.tangent_general(self.space, pattern, material, u, self.gamma, fibres, self.j_bar, convex,
-                                           elements)
-        return kernels.tangent(self.space, pattern, material, u, self.gamma, self.j_bar, convex, elements)
+        return self.backend.tangent(pattern, u, self.gamma, convex)
 
     def stiffest(self, u: np.ndarray, inverse_mass: np.ndarray) -> float:
         """Cheap indicator of the highest frequency squared at `u`, and below it [1/s^2].
@@ -182,14 +160,11 @@ class Momentum:
         The greatest Rayleigh quotient of what each element resists most: a change of volume, or of area in plane
         stress. `inverse_mass` (n, dim) is zero where a degree of freedom is held.
         """
-        x = self.space.X + u
-        if self.plane_stress:
-            return self.tiles.plane_stiffness(x, self._laws, inverse_mass)
-        return self.tiles.volumetric(x, [law.bulk_modulus for law in self._laws], inverse_mass)
+        return self.backend.stiffest(u, inverse_mass)
 
     def consistent_mass(self, pattern: Pattern) -> np.ndarray:
         """Data of the mass matrix of Eq. (28) on `pattern`."""
-        return kernels.mass(self.space, pattern, self.gamma, self.rho0)
+        return self.backend.mass(pattern, self.gamma)
 
     def lumped_mass(self, floor: float) -> np.ndarray:
         """Row sums (n,) [t; t/mm in 2D] of Eq. (28), at least `floor` times those of the intact solid."""
@@ -198,5 +173,5 @@ class Momentum:
     def _lumped(self, gamma: np.ndarray) -> np.ndarray:
         """Row sums (n,) of the mass matrix."""
         if isinstance(self.rho0, np.ndarray):
-            return self.space.lump(gamma * self.rho0)
-        return self.space.lump(gamma) * self.rho0
+            return self.backend.lump(gamma * self.rho0)
+        return self.backend.lump(gamma) * self.rho0

@@ -105,12 +105,17 @@ class Material:
                 + self.bulk_modulus * ((2 * J - 1) * J * GG - (J - 1) * J * G_cross))
 
     def thin_sheet(self, F: np.ndarray) -> np.ndarray:
-        """F (..., 3, 3) with the F_33 that leaves no stress P_33, from the part (..., 2, 2) in the plane, det > 0.
+        """F (..., 3, 3) with the F_33 that leaves no stress P_33, from the part (..., 2, 2) in the plane, det > 0."""
+        thin = np.zeros((*F.shape[:-2], 3, 3))
+        thin[..., :2, :2] = F
+        thin[..., 2, 2] = self.stretch_across(np.einsum("...iJ,...iJ", F, F), np.linalg.det(F))
+        return thin
+
+    def stretch_across(self, t: np.ndarray, j: np.ndarray) -> np.ndarray:
+        """The F_33 that leaves no stress P_33, from t = F : F and j = det F > 0 of the plane, (...).
 
         Found by bisection of log J; the element loops use Newton's method (:mod:`.kernels.plane_stress`).
         """
-        j = np.linalg.det(F)
-        t = np.einsum("...iJ,...iJ", F, F)
         low, high = np.full(j.shape, -12.0), np.full(j.shape, 12.0)
         for _ in range(64):
             log_J = 0.5 * (low + high)
@@ -119,10 +124,7 @@ class Material:
             _, dpsi, _ = self.isochoric(I * (t + square))
             falls = dpsi * I * (4 / 3 * square - 2 / 3 * t) + self.bulk_modulus * J * (J - 1) < 0
             low, high = np.where(falls, log_J, low), np.where(falls, high, log_J)
-        thin = np.zeros((*F.shape[:-2], 3, 3))
-        thin[..., :2, :2] = F
-        thin[..., 2, 2] = np.exp(0.5 * (low + high)) / j
-        return thin
+        return np.asarray(np.exp(0.5 * (low + high)) / j)
 
     @property
     def shear_modulus(self) -> float:

@@ -70,6 +70,10 @@ class GeneralMaterial(Material):
         psi, _, _ = self.isochoric(self._invariants(F, fibres, 0.0).values)
         return psi + 0.5 * self.bulk_modulus * ((J if J_bar is None else J_bar) - 1) ** 2
 
+    def isochoric_energy(self, F: np.ndarray, floor: float = 0.0, fibres: np.ndarray | None = None) -> np.ndarray:
+        """Stored energy psi alone [MPa], (...); J below `floor` is read as this."""
+        return self.isochoric(self._invariants(F, fibres, floor).values)[0]
+
     def isochoric_stress(self, F: np.ndarray, floor: float = 0.0, fibres: np.ndarray | None = None) -> np.ndarray:
         """First Piola-Kirchhoff stress of psi alone [MPa], (..., 3, 3); J below `floor` is read as this."""
         found = self._invariants(F, fibres, floor)

@@ -91,8 +91,8 @@ class Explicit:
         self.momentum.set_gamma(state.gamma, state.deleted)
         self._set_mass()
         self.reaction = self.momentum.force(state.u)
-        self._W = self.momentum.tiles.W
-        self._W_max = self.momentum.tiles.tile(state.W_max)
+        self._W = self.momentum.backend.W
+        self._W_max = self.momentum.backend.tile(state.W_max)
         self._elastic = self.momentum.energy
         self._spare, self._du = np.empty_like(self.reaction), np.empty_like(self.reaction)
 
@@ -201,7 +201,7 @@ class Explicit:
 
     def sync(self, state: State) -> None:
         """Bring `state.W_max` up to date; between density solves the integrator keeps it tiled."""
-        state.W_max = self.momentum.tiles.untile(self._W_max)
+        state.W_max = self.momentum.backend.untile(self._W_max)
 
     @property
     def _gamma_every(self) -> int:

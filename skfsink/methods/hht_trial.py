@@ -130,7 +130,7 @@ class Trial:
 
     def _balanced(self, residual: np.ndarray, inertia: np.ndarray, live: np.ndarray) -> bool:
         c, rounding = self.scheme.controls, self.scheme.rounding
-        level = self.momentum.tiles.mean_force() + float(np.mean(np.abs(inertia[live]))) + rounding[0]
+        level = self.momentum.backend.mean_force() + float(np.mean(np.abs(inertia[live]))) + rounding[0]
         increment = float(np.abs((self.u - self.state.u).ravel()[self._free][live]).max()) + rounding[1]
         return bool(np.abs(residual[live]).max() <= c.force_tolerance * level
                     and self._correction <= c.correction_tolerance * increment and self._settled)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numba
 
 from ..errors import ParameterError, require
+from ..fem.backends import backend
 from ..fields.density import SINKS
 from ..fields.momentum import ELEMENTS
 from ..methods.controls import ExplicitControls, HHTControls, StaticsControls
@@ -49,6 +50,7 @@ class Controls:
         OMP_NUM_THREADS or the machine's cores, at most 4. Runs with the same number agree to the last bit.
     start: of a dynamic analysis, "onset" (statics up to there) or "rest" (see :mod:`.rest`).
     active_zone: explicit steps solve for gamma only where it changes (see :mod:`.active_zone`).
+    kernels: "compiled", or "forms" (scikit-fem forms, for small meshes), or another name in :data:`.BACKENDS`.
     """
 
     analysis: str = "dynamic"
@@ -67,6 +69,7 @@ class Controls:
     threads: int = 0
     start: str = "onset"
     active_zone: bool = True
+    kernels: str = "compiled"
     explicit: ExplicitControls = field(default_factory=ExplicitControls)
     hht: HHTControls = field(default_factory=HHTControls)
     statics: StaticsControls = field(default_factory=StaticsControls)
@@ -79,6 +82,7 @@ class Controls:
             raise ParameterError(f"start rest is for analysis dynamic; got {self.analysis}")
         choose("sink", self.sink, SINKS)
         choose("element", self.element, ELEMENTS)
+        backend(self.kernels)
         require("overshoot", self.overshoot, low=0, high=0.1, low_open=True)
         require("deletion", self.deletion, low=0, high=1e-2, low_open=True)
         require("force-floor", self.force_floor, low=0, high=0.1)

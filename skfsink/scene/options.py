@@ -122,6 +122,8 @@ class Options:
         Quasi-static: a pass fails the points with at least this share of the greatest stored energy, in [0, 1].
     element
         "jbar" (element-constant J̄), "plain" (standard Q1, locks) or "planestress" (thin sheet with free faces, in 2D).
+    kernels
+        What evaluates the weak forms: "compiled" (element loops) or "forms" (scikit-fem, for small meshes).
     event_time
         Longest dynamic event [s], > 0.
     aftermath
@@ -195,6 +197,7 @@ class Options:
     integrator: Annotated[str, ANALYSIS] = Controls.integrator
     front: Annotated[float, ANALYSIS] = StaticsControls.front
     element: Annotated[str, ANALYSIS] = Controls.element
+    kernels: Annotated[str, ANALYSIS] = Controls.kernels
     event_time: Annotated[float, ANALYSIS, Unit("s")] = Controls.event_time
     aftermath: Annotated[float, ANALYSIS, Unit("s")] = Controls.aftermath
     courant: Annotated[float, EXPLICIT] = ExplicitControls.courant

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import ParameterError
+from ..fem.backends import backend
 from ..fem.space import Space
 from ..fields.momentum import check_element
 from ..loads.grips import Grip, Ramp, Traction
@@ -82,6 +83,7 @@ class Scene:
         for boundary in (load.boundary for group in (self.grips, self.rollers, self.tractions) for load in group):
             self.sample.nodes(boundary)
         check_element(self.controls.element, self.sample.space)
+        backend(self.controls.kernels).check(self.sample.space)
         check_lengths(self.sink_law, self.regions)
         _ = self.parts
         loading = self.loading()
@@ -160,5 +162,6 @@ class Scene:
         text = replace(self, parameters={**self.parameters, "mesh": ""}, model_choice={}).stored().toml()
         controls = replace(self.controls, checkpoint_every=Controls.checkpoint_every)  # a checkpoint changes nothing
         space = self.sample.space
-        return digest([text, space.X, space.conn, self.sample.boundaries, controls, self.material, self.sink_law,
-                       self.regions, self.grips, self.rollers, self.tractions, self.loads, self.faces, self.whole])
+        return digest([text, space.X, space.conn, self.sample.boundaries, controls,
+                       tuple(backend(controls.kernels)), self.material, self.sink_law, self.regions, self.grips,
+                       self.rollers, self.tractions, self.loads, self.faces, self.whole])
