@@ -25,7 +25,8 @@ from skfem.assembly.form.form import FormExtraParams
 from ..errors import ParameterError
 from ..material import Material
 from .backend import Part
-from .forms import MomentumForms, density_forms, element_forms, row_sums
+from .elements import ELEMENTS
+from .forms import MomentumForms, density_forms, row_sums
 from .pattern import Pattern
 from .space import Space
 
@@ -84,7 +85,7 @@ class AssembledMomentum:
 
     def forms(self, material: Material) -> MomentumForms:
         """The forms of a material; a form that is to be tried takes the place of one of them."""
-        return element_forms(material, self._element)
+        return ELEMENTS[self._element].forms(material)
 
     def _fields(self, number: int, u: np.ndarray, gamma: np.ndarray) -> dict[str, Any]:
         """What the forms of a part are functions of, at the displacement `u` (n, dim) and density (ne, nq)."""
@@ -167,7 +168,7 @@ class AssembledMomentum:
             b = assembly.vectors(forms.dilatation, **fields)
             moved = b * inverse_mass.ravel()[assembly.dofs]
             norm = np.einsum("ei,ei->e", b, moved)
-            if self._element == "planestress":
+            if ELEMENTS[self._element].thin_sheet:
                 d = self._motion(assembly, moved)
                 stiffness = np.sum(np.asarray(forms.tangent.form(d, d, _extra(fields))) * dV, axis=1)
                 quotient = stiffness[norm > 0.0] / norm[norm > 0.0]

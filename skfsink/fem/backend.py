@@ -11,10 +11,7 @@ from ..material import Material
 from .pattern import Pattern
 from .space import Space
 
-__all__ = ["ELEMENTS", "Backend", "DensityBackend", "MomentumBackend", "Part"]
-
-#: element-constant J_bar, the standard element, and the thin sheet of quadrilaterals
-ELEMENTS = ("jbar", "plain", "planestress")
+__all__ = ["Backend", "DensityBackend", "MomentumBackend", "Part"]
 
 
 class Part(NamedTuple):
@@ -29,7 +26,7 @@ class Part(NamedTuple):
 
 
 class MomentumBackend(Protocol):
-    """Evaluates the momentum balance for one mesh, its parts and one of `ELEMENTS`.
+    """Evaluates the momentum balance for one mesh, its parts and one of the elements of :mod:`.elements`.
 
     Values at the Gauss points may have a layout of the backend's own: `tile` and `untile` go there and back.
 

@@ -9,6 +9,7 @@ import numpy as np
 from ..material import GeneralMaterial
 from . import kernels
 from .backend import Part
+from .elements import ELEMENTS
 from .pattern import Pattern
 from .space import Space
 
@@ -23,7 +24,7 @@ class CompiledMomentum:
 
     def __init__(self, space: Space, parts: Sequence[Part], element: str, *, threads: int = 1) -> None:
         self._space, self._parts = space, parts
-        self._plane_stress, self._j_bar = element == "planestress", element == "jbar"
+        self._plane_stress, self._j_bar = ELEMENTS[element].thin_sheet, ELEMENTS[element].j_bar
         self.tiles = kernels.Tiles(space, self._plane_stress, threads,
                                    [(part.elements, part.fibres) for part in parts])
         materials = [part.material for part in parts]

@@ -29,7 +29,7 @@ from ..material.general import cofactor
 from .kernels import ERSATZ_STIFFNESS, SOFT_GAMMA
 from .kernels.lanes import J_FLOOR
 
-__all__ = ["DensityForms", "MomentumForms", "density_forms", "element_forms", "element_mean", "momentum_forms",
+__all__ = ["DensityForms", "MomentumForms", "density_forms", "element_mean", "momentum_forms",
            "plane_stress_forms", "row_sums"]
 
 
@@ -84,11 +84,6 @@ def element_mean(values: Any, dV: Any) -> np.ndarray:
     """Projection of Gauss point values (..., ne, nq) on the element constants, at every Gauss point (Eq. 13)."""
     mean = np.sum(values * dV, axis=-1, keepdims=True) / np.sum(np.asarray(dV), axis=-1, keepdims=True)
     return np.broadcast_to(mean, np.broadcast(values, dV).shape)
-
-
-def element_forms(material: Material, element: str) -> MomentumForms:
-    """Forms of the momentum balance for `material` and one of the elements "jbar", "plain" and "planestress"."""
-    return plane_stress_forms(material) if element == "planestress" else momentum_forms(material, element == "jbar")
 
 
 def _once(function: Callable[[Any], Any]) -> Callable[[Any], Any]:

@@ -2,10 +2,8 @@
 
     int l^2 Grad gamma . Grad dgamma + gamma dgamma/(H + eps) = int dgamma
 
-With `sink="lumped"` (the default) the sink term is lumped by row sums: the matrix is an M-matrix wherever the
-Laplacian's off-diagonals are not positive, and then 0 < gamma <= 1. "consistent" is the paper's form, whose sink
-varies by 1e15 inside an element: gamma dips below zero next to a crack and conjugate gradients stall, so it is
-factorised. "nearest" gives each Gauss point to the node next to it.
+The sink term has several quadratures, see :mod:`.sinks`. Where it stays on the diagonal the system is solved by
+conjugate gradients with an algebraic multigrid preconditioner, else it is factorised.
 """
 
 from __future__ import annotations
@@ -27,10 +25,10 @@ from ..material import SinkLaw
 from ..material.regions import Region, by_element, check_lengths, rest_of
 from ..system.jit import njit
 from .active_zone import ActiveZone, Zone
+from .sinks import SINKS
 
-__all__ = ["SINKS", "Density", "DensitySolver"]
+__all__ = ["Density", "DensitySolver"]
 
-SINKS = ("lumped", "consistent", "nearest")
 log = logging.getLogger(__name__)
 
 
@@ -63,7 +61,7 @@ class DensitySolver:
     ----------
     space: the spaces.
     law: sink and flux parameters, of the elements that are in no region.
-    sink: one of `SINKS`.
+    sink: one of :data:`.SINKS`.
     unchanged: a solve is left out when no sink coefficient moved by more than this, relatively, since the last one.
     active_zone: solves with a tolerance of their own are made where gamma changes (see :mod:`.active_zone`).
     regions: elements with limiters of their own; the length l and epsilon are those of `law`.
@@ -82,7 +80,7 @@ class DensitySolver:
                  kernels: str = "compiled") -> None:
         if sink not in SINKS:
             raise ParameterError(f"sink must be one of {', '.join(SINKS)}; got {sink!r}")
-        self.space, self.law, self.sink = space, law, sink
+        self.space, self.law, self.sink, self._quadrature = space, law, sink, SINKS[sink]
         self.unchanged = unchanged
         check_lengths(law, regions)
         ne = space.n_elements
@@ -97,7 +95,8 @@ class DensitySolver:
         self._data, self._laplacian_diagonal = self._laplacian.copy(), self._laplacian[self.pattern.diagonal]
         self._direct: Factorization | None = None
         self._amg = AmgCG(self.pattern.matrix(self._assemble(np.ones_like(space.w))), tolerance)
-        self.zone = ActiveZone(space.X, law.length_scale, self._amg) if active_zone and sink != "consistent" else None
+        looks_in_zones = active_zone and self._quadrature.monotone
+        self.zone = ActiveZone(space.X, law.length_scale, self._amg) if looks_in_zones else None
         self._residual = 0.0
         self.solves = self.skipped = self.iterations = self.fallbacks = 0
 
@@ -140,11 +139,11 @@ class DensitySolver:
         self.solves += 1
         data = self._assemble(sink)
         result, zones = None, before.zones
-        if self.sink != "consistent" or sink.max() < 1e3 * sink.min():
+        if self._quadrature.monotone or sink.max() < 1e3 * sink.min():
             result, zones = self._iterate(self.pattern.matrix(data), data[self.pattern.diagonal], before, tolerance)
         if result is None:
             result = self._factorise(data)
-        if self.sink != "consistent" and not (-self._error < result.min() and result.max() < 1 + self._error):
+        if self._quadrature.monotone and not (-self._error < result.min() and result.max() < 1 + self._error):
             raise ConvergenceError(f"the relative density left (0, 1]: {result.min():.3g} to {result.max():.6g}; the "
                                    f"mesh has elements so flat that the lumped sink loses its maximum principle")
         return Density(result, sink, zones)
@@ -174,26 +173,24 @@ class DensitySolver:
         return result, zones
 
     def _assemble(self, sink: np.ndarray) -> np.ndarray:
-        if self.sink == "consistent":
-            return self._laplacian + self.backend.sink(self.pattern, sink)
+        if not self._quadrature.monotone:
+            return self._laplacian + self._quadrature.assemble(self.pattern, self.backend, sink)
         self._data[self.pattern.diagonal] = self._laplacian_diagonal + self._lump(sink)
         return self._data  # one array for all solves: only the diagonal changes
 
     def _lump(self, values: np.ndarray) -> np.ndarray:
         """Nodal sums (n,) of Gauss point values; of sink and load alike, so that H = 1 gives gamma = 1."""
-        if self.sink == "nearest":
-            return np.bincount(self.space.conn.ravel(), (self.space.w * values).ravel(), self.space.n_nodes)
-        return self.backend.lump(values)
+        return self._quadrature.sums(self.space, self.backend, values)
 
     def _factorise(self, data: np.ndarray) -> np.ndarray:
         """Direct solve, on the matrix scaled to a unit diagonal: its entries span fifteen decades."""
         if self._direct is None:
-            if self.sink != "consistent":
+            if self._quadrature.monotone:
                 log.warning("conjugate gradients on the %s sink did not converge in %d iterations; factorising",
                             self.sink, self._amg.max_iterations)
             else:
-                log.warning("the consistent sink varies by more than 1e3 inside an element, where conjugate gradients "
-                            "stall; factorising instead")
+                log.warning("the %s sink varies by more than 1e3 inside an element, where conjugate gradients stall; "
+                            "factorising instead", self.sink)
             self._direct = Factorization(Pattern(self.space, upper=True))
         self.fallbacks += 1
         upper = self._direct.pattern

@@ -7,21 +7,16 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..errors import ParameterError
-from ..fem.backend import ELEMENTS, Part
+from ..fem.backend import Part
 from ..fem.backends import backend
+from ..fem.elements import check_element
 from ..fem.pattern import Pattern
 from ..fem.space import Space
 from ..loads.nodal import NodalLoads
 from ..material import GeneralMaterial, Material
 from ..material.regions import Region, by_element, rest_of
 
-__all__ = ["ELEMENTS", "Momentum", "Part", "check_element"]
-
-
-def check_element(element: str, space: Space) -> None:
-    """Refuse an element that is not made for the dimension of `space` (ParameterError)."""
-    if element == "planestress" and space.dim == 3:
-        raise ParameterError("element planestress is for meshes of quadrilaterals; this one has hexahedra: take jbar")
+__all__ = ["Momentum", "Part"]
 
 
 class Momentum:
@@ -56,11 +51,8 @@ class Momentum:
     def __init__(self, space: Space, material: Material, element: str = "jbar", force_floor: float = 1e-3,
                  threads: int = 1, *, regions: Sequence[Region] = (), dead: NodalLoads | None = None,
                  kernels: str = "compiled") -> None:
-        if element not in ELEMENTS:
-            raise ParameterError(f"element must be one of {', '.join(ELEMENTS)}; got {element!r}")
-        check_element(element, space)
+        self.plane_stress = check_element(element, space, kernels).thin_sheet
         self.space, self.material, self.element, self.force_floor = space, material, element, force_floor
-        self.plane_stress = element == "planestress"
         self.parts = self._divide(regions)
         materials = [part.material for part in self.parts]
         self.backend = backend(kernels).momentum(space, self.parts, element, threads=threads)

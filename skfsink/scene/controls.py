@@ -9,8 +9,8 @@ import numba
 
 from ..errors import ParameterError, require
 from ..fem.backends import backend
-from ..fields.density import SINKS
-from ..fields.momentum import ELEMENTS
+from ..fem.elements import ELEMENTS
+from ..fields.sinks import SINKS
 from ..methods.controls import ExplicitControls, HHTControls, StaticsControls
 from ..methods.integrators import INTEGRATORS
 
@@ -80,8 +80,8 @@ class Controls:
         choose("start", self.start, STARTS)
         if self.start == "rest" and self.analysis != "dynamic":
             raise ParameterError(f"start rest is for analysis dynamic; got {self.analysis}")
-        choose("sink", self.sink, SINKS)
-        choose("element", self.element, ELEMENTS)
+        choose("sink", self.sink, tuple(SINKS))
+        choose("element", self.element, tuple(ELEMENTS))
         backend(self.kernels)
         require("overshoot", self.overshoot, low=0, high=0.1, low_open=True)
         require("deletion", self.deletion, low=0, high=1e-2, low_open=True)

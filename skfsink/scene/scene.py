@@ -10,8 +10,8 @@ import numpy as np
 
 from ..errors import ParameterError
 from ..fem.backends import backend
+from ..fem.elements import check_element
 from ..fem.space import Space
-from ..fields.momentum import check_element
 from ..loads.grips import Grip, Ramp, Traction
 from ..loads.nodal import NodalLoads
 from ..loads.schedule import Loading
@@ -82,7 +82,7 @@ class Scene:
     def __post_init__(self) -> None:
         for boundary in (load.boundary for group in (self.grips, self.rollers, self.tractions) for load in group):
             self.sample.nodes(boundary)
-        check_element(self.controls.element, self.sample.space)
+        check_element(self.controls.element, self.sample.space, self.controls.kernels)
         backend(self.controls.kernels).check(self.sample.space)
         check_lengths(self.sink_law, self.regions)
         _ = self.parts

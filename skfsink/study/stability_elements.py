@@ -14,8 +14,9 @@ from scipy.sparse.linalg import cg, spsolve
 from ..errors import ConvergenceError
 from ..fem.indicators import alternation, element_pressure
 from ..fem.space import Space
-from ..fields.density import SINKS, DensitySolver
+from ..fields.density import DensitySolver
 from ..fields.momentum import Momentum
+from ..fields.sinks import SINKS
 from ..material import AAA, SinkLaw
 from ..methods.controls import StaticsControls
 from ..methods.newton import Newton

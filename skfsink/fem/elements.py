@@ -1,0 +1,59 @@
+"""The elements by name: adding one is the function of its forms, and a line in `ELEMENTS`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import NamedTuple
+
+from ..errors import ParameterError
+from ..material import Material
+from .forms import MomentumForms, momentum_forms, plane_stress_forms
+from .space import Space
+
+__all__ = ["ELEMENTS", "Element", "check_element"]
+
+
+class Element(NamedTuple):
+    """How an element turns displacement into stored energy.
+
+    Attributes
+    ----------
+    forms: its weak forms for a material.
+    dimensions: of the meshes it is made for.
+    thin_sheet: whether it is a thin sheet with free faces (plane stress).
+    j_bar: whether its volume change is one value an element (Eq. 13); the compiled loops are told so.
+    compiled: whether there are compiled loops for it; without them it takes `--kernels forms`.
+    """
+
+    forms: Callable[[Material], MomentumForms]
+    dimensions: tuple[int, ...] = (2, 3)
+    thin_sheet: bool = False
+    j_bar: bool = False
+    compiled: bool = False
+
+
+ELEMENTS: dict[str, Element] = {
+    "jbar": Element(partial(momentum_forms, j_bar=True), j_bar=True, compiled=True),
+    "plain": Element(partial(momentum_forms, j_bar=False), compiled=True),
+    "planestress": Element(plane_stress_forms, dimensions=(2,), thin_sheet=True, compiled=True),
+}
+
+
+def check_element(name: str, space: Space, kernels: str = "compiled") -> Element:
+    """The element of that name, for a body of that dimension.
+
+    Raises
+    ------
+    ParameterError
+        There is none, it is not made for the dimension, or has no compiled loops.
+    """
+    if name not in ELEMENTS:
+        raise ParameterError(f"element must be one of {', '.join(ELEMENTS)}; got {name!r}")
+    element = ELEMENTS[name]
+    if space.dim not in element.dimensions:
+        cells = ("quadrilaterals", "hexahedra") if space.dim == 3 else ("hexahedra", "quadrilaterals")
+        raise ParameterError(f"element {name} is for meshes of {cells[0]}; this one has {cells[1]}: take jbar")
+    if kernels == "compiled" and not element.compiled:
+        raise ParameterError(f"element {name} has no compiled loops: take --kernels forms")
+    return element
