@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -80,9 +81,9 @@ class Energies:
 
         Between two of them the energy is the mean by the densities: what is gone at the second has that of the first.
         """
-        series, w = list(moments), self.body.space.w
+        w = self.body.space.w
         stored = kinetic = 0.0
-        for one, two in zip(series, series[1:], strict=False):
+        for one, two in pairwise(moments):
             stored += float((w * (one.gamma - two.gamma) * _mean(one.gamma, one.W, two.gamma, two.W)).sum())
             kinetic += float(((one.mass - two.mass) * _mean(one.mass, one.half_v2, two.mass, two.half_v2)).sum())
         return stored, kinetic

@@ -28,13 +28,6 @@ POSITIVE = ["side", "notch", "notch-width", "c1", "bulk-modulus", "m", "length-s
 OR_ZERO = ["c2", "phi", "gamma-every", "force-floor", "mass-floor", "aftermath", "mesh-seed", "threads"]
 
 
-@pytest.fixture
-def mesh(tmp_path: Path) -> Path:
-    """File of the small plate."""
-    write_mesh(tmp_path / "plate.vtu", plate())
-    return tmp_path / "plate.vtu"
-
-
 def refused(tmp_path: Path, *arguments: object) -> str:
     """The line that refuses these arguments: the only one, with exit status 2, and no file was touched."""
     before = contents(tmp_path)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import scipy.sparse.linalg as sla
 import skfem
-from bodies import box, distorted, grid
+from bodies import FAILED, box, crack, distorted, gauss_points, grid
 from scipy.sparse import csc_array, diags_array
 
 from skfsink.errors import ConvergenceError, ParameterError
@@ -23,25 +23,12 @@ from skfsink.meshing.vtu import read_mesh
 
 COMMITTED = Path(__file__).resolve().parents[1] / "cases" / "single_edge_notch" / "meshes"
 LAW = SinkLaw()
-FAILED = 1.0  # MPa: six times Phi, H = 0
 
 
 @cache
 def committed(name: str) -> Space:
     mesh = read_mesh(COMMITTED / f"{name}.vtu")
     return Space(skfem.MeshQuad(mesh.points[:, :2].T, mesh.cells_dict["quad"].T))
-
-
-def gauss_points(space: Space) -> np.ndarray:
-    """(ne, nq, dim)"""
-    return np.einsum("qa,eai->eqi", space.N, space.X[space.conn])
-
-
-def crack(space: Space, width: float = 0.06) -> np.ndarray:
-    """W of a wavy crack of the given width [mm] through 0.6 of the body; it cuts elements between Gauss points."""
-    points, size = gauss_points(space), np.ptp(space.X, axis=0)
-    x, y = points[..., 0] / size[0], points[..., 1] - space.X[:, 1].mean()
-    return np.where((np.abs(y - 0.05 * np.sin(8 * x)) < width / 2) & (x < 0.6), FAILED, 0.0)
 
 
 def damages(space: Space) -> dict[str, np.ndarray]:
