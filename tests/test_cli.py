@@ -205,7 +205,7 @@ def check_files(folder: Path, summary: dict[str, object]) -> None:
     assert not list(folder.rglob(".*"))
 
 
-def test_files_of_both_analyses(mesh: Path, tmp_path: Path) -> None:
+def test_files_of_both_analyses(mesh: Path, tmp_path: Path, pictures: None) -> None:
     """Fails if a file is missing, a key of schema 3 is, or a separated plate is not reported as such."""
     out = tmp_path / "a [b] c"  # a name that is markup to rich
     status, err, _ = invoke("--mesh", mesh, "--out", out, "--analysis", "both", "--frame-every", "2e-5", *SMALL)
@@ -230,7 +230,7 @@ def test_files_of_both_analyses(mesh: Path, tmp_path: Path) -> None:
     assert summary["dynamic"]["event"]["first_arrival_s"] > 1e-5
 
 
-def test_event_too_short_for_a_crack(mesh: Path, tmp_path: Path) -> None:
+def test_event_too_short_for_a_crack(mesh: Path, tmp_path: Path, pictures: None) -> None:
     """Fails if pictures or summary need a crack: none has started when the event ends."""
     out = tmp_path / "out"
     status, err, _ = invoke("--mesh", mesh, "--out", out, "--event-time", "1e-9", *SMALL)
