@@ -20,6 +20,8 @@ from skfsink.material import AAA, Material, SinkLaw
 from skfsink.material.regions import Region
 from skfsink.methods.statics import Statics
 
+FAILED = 1.0  # MPa: six times Phi, H = 0
+
 
 def distorted(mesh: skfem.Mesh, amount: float, seed: int = 0) -> skfem.Mesh:
     """`mesh` with its interior nodes moved at random by up to `amount` of the shortest edge along each axis."""
@@ -94,6 +96,18 @@ def patchy(space: Space, seed: int = 2, dead: float = 0.2) -> np.ndarray:
     return gamma
 
 
+def gauss_points(space: Space) -> np.ndarray:
+    """Coordinates of the Gauss points [mm], (ne, nq, dim)."""
+    return np.einsum("qa,eai->eqi", space.N, space.X[space.conn])
+
+
+def crack(space: Space, width: float = 0.06) -> np.ndarray:
+    """W [MPa] (ne, nq) of a wavy crack, `width` [mm] wide, through 0.6 of the body; it cuts elements between points."""
+    points, size = gauss_points(space), np.ptp(space.X, axis=0)
+    x, y = points[..., 0] / size[0], points[..., 1] - space.X[:, 1].mean()
+    return np.where((np.abs(y - 0.05 * np.sin(8 * x)) < width / 2) & (x < 0.6), FAILED, 0.0)
+
+
 def held_body(momentum: Momentum, density: DensitySolver, free: np.ndarray, velocity: np.ndarray, **settings) -> Body:
     """A body whose degrees of freedom but `free` (n*dim,) are held, and move at `velocity` (n, dim)."""
     return Body(momentum, density, Loading.steady(momentum.space, free, velocity), **settings)
@@ -157,6 +171,7 @@ def momentum_of(space: Space, material: Material, gamma: np.ndarray, element: st
 
 
 def close(got, expected, tolerance: float = 1e-12) -> None:
-    """Assert that arrays differ by at most `tolerance` of their greatest entry."""
+    """Assert that arrays of one shape differ by at most `tolerance` of their greatest entry."""
+    assert got.shape == expected.shape
     error = abs(got - expected).max() / abs(expected).max()
     assert error <= tolerance, f"relative difference {error:.2e}"

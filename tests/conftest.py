@@ -1,4 +1,4 @@
-"""Fixtures shared by the tests: one distorted mesh of each kind, one plate about to break."""
+"""Fixtures shared by the tests: distorted meshes, a plate about to break, its mesh file, and pictures on demand."""
 
 from __future__ import annotations
 
@@ -6,10 +6,16 @@ import os
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # threads do not outlive a fork, and tests of resuming fork
 
+from collections.abc import Iterator
+from pathlib import Path
+
 import pytest
 from bodies import Fracture, at_onset, box, notched
+from plates import plate
 
 from skfsink.fem.space import Space
+from skfsink.meshing.vtu import write_mesh
+from skfsink.run import compute
 
 
 @pytest.fixture(params=["quad", "hex"])
@@ -28,3 +34,29 @@ def space(kind: str) -> Space:
 def fracture() -> Fracture:
     """A notched plate of 219 quads just past its onset; loading takes two seconds, so it is done once."""
     return at_onset(notched(15))
+
+
+@pytest.fixture
+def mesh(tmp_path: Path) -> Path:
+    """Mesh file of the small plate, `plate.vtu` in the folder of the test."""
+    write_mesh(tmp_path / "plate.vtu", plate())
+    return tmp_path / "plate.vtu"
+
+
+DRAWING = {name: getattr(compute, name) for name in ("draw_run", "draw_comparison")}
+
+
+@pytest.fixture(scope="session", autouse=True)
+def no_pictures() -> Iterator[None]:
+    """Runs within the process of the tests draw nothing: pictures take longer than runs of small bodies."""
+    with pytest.MonkeyPatch.context() as patch:
+        for name in DRAWING:
+            patch.setattr(compute, name, lambda *_: None)
+        yield
+
+
+@pytest.fixture
+def pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Runs draw their pictures in this test."""
+    for name, draw in DRAWING.items():
+        monkeypatch.setattr(compute, name, draw)

@@ -19,6 +19,8 @@ import numpy as np
 from skfsink.__main__ import main
 from skfsink.cases.single_edge_notch import single_edge_notch
 from skfsink.cli.program import command
+from skfsink.meshing.sample import Sample, file_sample
+from skfsink.meshing.vtu import write_mesh
 
 os.environ["SKFSINK_DEBUG"] = "1"  # what should not happen is a traceback then
 SMALL = ["--length-scale", "0.6", "--hht-dt", "5e-7", "--quiet"]  # for the elements of 0.3 mm of `plate()`
@@ -44,6 +46,26 @@ def plate(n: int = 13, side: float = 4.0, notch: float = 1.0) -> meshio.Mesh:
     points[inside, :2] += np.random.default_rng(0).uniform(-0.2, 0.2, (len(inside), 2)) * side / n
     return meshio.Mesh(points, [("quad", quads), ("line", lines)],
                        cell_sets={name: [np.zeros(0, int), np.flatnonzero(mask)] for name, mask in sets.items()})
+
+
+def sample_of(folder: Path, mesh: meshio.Mesh) -> Sample:
+    """The sample of a mesh that is written to `plate.vtu` in a folder, and read."""
+    write_mesh(folder / "plate.vtu", mesh)
+    return file_sample(folder / "plate.vtu")
+
+
+def same(one: Sample, two: Sample) -> bool:
+    """Whether two samples are the same numbers, of which the same bytes of results follow."""
+    return (one.space.X.tobytes() == two.space.X.tobytes() and np.array_equal(one.space.conn, two.space.conn)
+            and all(a.keys() == b.keys() and all(np.array_equal(a[name], b[name]) for name in a)
+                    for a, b in ((one.boundaries, two.boundaries), (one.cells, two.cells))))
+
+
+def deck(folder: Path, text: str) -> Path:
+    """File of a deck in a folder."""
+    path = folder / "deck.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
 
 
 def invoke(*arguments: object) -> tuple[Any, str, str]:

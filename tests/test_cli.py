@@ -28,13 +28,6 @@ POSITIVE = ["side", "notch", "notch-width", "c1", "bulk-modulus", "m", "length-s
 OR_ZERO = ["c2", "phi", "gamma-every", "force-floor", "mass-floor", "aftermath", "mesh-seed", "threads"]
 
 
-@pytest.fixture
-def mesh(tmp_path: Path) -> Path:
-    """File of the small plate."""
-    write_mesh(tmp_path / "plate.vtu", plate())
-    return tmp_path / "plate.vtu"
-
-
 def refused(tmp_path: Path, *arguments: object) -> str:
     """The line that refuses these arguments: the only one, with exit status 2, and no file was touched."""
     before = contents(tmp_path)
@@ -212,7 +205,7 @@ def check_files(folder: Path, summary: dict[str, object]) -> None:
     assert not list(folder.rglob(".*"))
 
 
-def test_files_of_both_analyses(mesh: Path, tmp_path: Path) -> None:
+def test_files_of_both_analyses(mesh: Path, tmp_path: Path, pictures: None) -> None:
     """Fails if a file is missing, a key of schema 3 is, or a separated plate is not reported as such."""
     out = tmp_path / "a [b] c"  # a name that is markup to rich
     status, err, _ = invoke("--mesh", mesh, "--out", out, "--analysis", "both", "--frame-every", "2e-5", *SMALL)
@@ -237,7 +230,7 @@ def test_files_of_both_analyses(mesh: Path, tmp_path: Path) -> None:
     assert summary["dynamic"]["event"]["first_arrival_s"] > 1e-5
 
 
-def test_event_too_short_for_a_crack(mesh: Path, tmp_path: Path) -> None:
+def test_event_too_short_for_a_crack(mesh: Path, tmp_path: Path, pictures: None) -> None:
     """Fails if pictures or summary need a crack: none has started when the event ends."""
     out = tmp_path / "out"
     status, err, _ = invoke("--mesh", mesh, "--out", out, "--event-time", "1e-9", *SMALL)

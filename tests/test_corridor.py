@@ -97,7 +97,6 @@ def test_a_crack_that_leaves_the_corridor_is_counted_and_warned_of(tmp_path: Pat
 def test_without_gmsh_the_committed_mesh_is_taken_and_said_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if the fall-back is silent, or is stored as what it is not."""
     monkeypatch.setattr(skfsink.run.request, "has_gmsh", lambda: False)
-    monkeypatch.setattr(skfsink.run.compute, "draw_run", lambda *_: None)
     options = Options(mesh_layout="two-pass", event_time=1e-7, out=tmp_path / "run", quiet=True)
     result = single_edge_notch(mesh="coarse", options=options)
     assert any("no gmsh" in text for text in result.summary["warnings"])

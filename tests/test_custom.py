@@ -11,9 +11,8 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from plates import contents, invoke_program, plate
+from plates import contents, deck, invoke_program, plate
 
-import skfsink.run.compute
 from skfsink.cases.custom import CASE, custom
 from skfsink.errors import MeshError, ParameterError, SkfsinkError
 from skfsink.loads.grips import Grip, Ramp, Traction
@@ -42,17 +41,10 @@ GRIPS = '[[grips]]\nboundary = "top"\nx = 0\ny = "1 µm/s"\n[[grips]]\nboundary 
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder with the mesh of the small plate, from which runs draw nothing."""
+    """The working folder, with the mesh of the small plate."""
     write_mesh(tmp_path / "plate.vtu", plate())
-    monkeypatch.setattr(skfsink.run.compute, "draw_run", lambda *_: None)
     monkeypatch.chdir(tmp_path)
     return tmp_path
-
-
-def deck(folder: Path, text: str) -> Path:
-    """File of a deck."""
-    (folder / "deck.toml").write_text(text, encoding="utf-8")
-    return folder / "deck.toml"
 
 
 def test_a_deck_its_scene_file_and_python_give_the_same_run(folder: Path) -> None:

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
-from plates import invoke, invoke_program, plate
+from plates import deck, invoke, invoke_program, plate
 
 from skfsink.cli.show import deck_text
 from skfsink.errors import OutputError, ParameterError, SkfsinkError
@@ -23,13 +23,6 @@ from skfsink.scene.stored import StoredScene
 from skfsink.units import in_unit
 
 REFERENCES = sorted((Path(__file__).resolve().parents[1] / "cases").glob("*/reference/*/scene.toml"))
-
-
-def deck(folder: Path, text: str) -> Path:
-    """File of a deck."""
-    path = folder / "deck.toml"
-    path.write_text(text, encoding="utf-8")
-    return path
 
 
 def parameters(folder: Path, text: str, case: str = "single_edge_notch") -> dict[str, Any]:

@@ -15,7 +15,6 @@ import pytest
 from plates import invoke_program, plate
 
 import skfsink
-from skfsink.cases.single_edge_notch import single_edge_notch
 from skfsink.cli.program import command
 from skfsink.meshing import sample
 from skfsink.meshing.vtu import write_mesh
@@ -63,30 +62,60 @@ def place(tmp_path: Path) -> Iterator[Path]:
         yield tmp_path
 
 
+#: what the reader of a block has that the block does not bring, by words in it
+BEFORE = {
+    'skfsink.load("results/single_edge_notch/M3-dynamic")': """
+from skfsink import Options
+from skfsink.cases.single_edge_notch import single_edge_notch
+single_edge_notch(mesh="coarse", options=Options(length_scale=0.9, quiet=True,
+                                                 out="results/single_edge_notch/M3-dynamic"))
+"""}
+#: uses of what a block defines, by words in it
+AFTER = {
+    "class Demiray(": """
+from skfsink import SinkLaw, peaks
+assert peaks(Demiray(), SinkLaw(phi=0.1))["uniaxial tension"].stress > 0
+""",
+    "def double_edge_notch_mesh(": """
+import importlib.util
+if importlib.util.find_spec("gmsh"):
+    assert len(double_edge_notch_mesh(h=0.1, h_coarse=0.2).points) > 100
+""",
+    "def double_edge_notch(": """
+result = double_edge_notch(mesh="coarse", options=Options(length_scale=0.9, event_time=1e-6, quiet=True))
+assert result.summary["case"] == CASE.name
+"""}
+
+
 def programs() -> dict[str, list[str]]:
-    """By page the Python examples that bring their imports, each once; the others are parts of something."""
+    """By page its Python blocks, each once."""
     found: dict[str, list[str]] = {}
     for page in sorted(PAGES, reverse=True):
         known = [text for texts in found.values() for text in texts]
-        found[page] = [text for text in blocks(page, "python")
-                       if re.search(r"^(from|import) ", text, re.MULTILINE) and text not in known]
+        found[page] = [text for text in blocks(page, "python") if text not in known]
     return {page: texts for page, texts in found.items() if texts}
 
 
+def around(text: str, pieces: dict[str, str]) -> list[str]:
+    """Those of the pieces whose words are in a block."""
+    return [piece for words, piece in pieces.items() if words in text]
+
+
 @pytest.mark.parametrize("page", programs())
-def test_examples_run(page: str, place: Path) -> None:
-    """Fails if an example, one after the other on its page, ends with an error."""
-    if page == "docs/results.md":  # which reads a run
-        options = Options(length_scale=0.9, quiet=True, out=place / "results" / "single_edge_notch" / "M3-dynamic")
-        single_edge_notch(mesh="coarse", options=options)
+def test_every_block_runs(page: str, place: Path) -> None:
+    """Fails if a Python block, one after the other on its page, ends with an error, or what it defines is of no use."""
+    names = {"__name__": "example"}
     for text in programs()[page]:
-        exec(compile(text, page, "exec", dont_inherit=True), {"__name__": "example"})
+        for program in (*around(text, BEFORE), text, *around(text, AFTER)):
+            exec(compile(program, page, "exec", dont_inherit=True), names)
 
 
-def test_there_are_examples() -> None:
-    """Fails if the blocks are not found any more."""
+def test_there_are_blocks() -> None:
+    """Fails if blocks are not found any more, or what comes before or after one belongs to none."""
     assert {page: len(texts) for page, texts in programs().items()}.items() >= {
-        "docs/first_crack.md": 4, "docs/results.md": 1, "CONTRIBUTING.md": 2}.items()
+        "docs/first_crack.md": 4, "docs/results.md": 1, "CONTRIBUTING.md": 3}.items()
+    texts = [text for page in programs().values() for text in page]
+    assert all(any(words in text for text in texts) for words in (*BEFORE, *AFTER))
 
 
 def commands() -> list[str]:
@@ -193,12 +222,6 @@ def test_numbers_of_the_loading_are_those_of_the_program() -> None:
     said = re.search(r"\*\*Limits\.\*\* (\d+) steps for each equilibrium.* at most (\d+) passes.*?; (\d+)\s+in a pass",
                      PAGES["docs/methods.md"], re.DOTALL)
     assert said and [int(n) for n in said.groups()] == [controls.max_newton, controls.max_passes, Statics.SNAP]
-
-
-def test_the_example_of_a_case_calls_what_there_is() -> None:
-    """Fails if the case in CONTRIBUTING calls what is no method of the options."""
-    called = re.findall(r"\boptions\.(\w+)\(", PAGES["CONTRIBUTING.md"])
-    assert len(called) >= 4 and all(callable(getattr(Options(), name)) for name in called), called
 
 
 # --- pages ---

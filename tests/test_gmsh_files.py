@@ -9,11 +9,11 @@ import meshio
 import numpy as np
 import pytest
 from gmsh_kinds import FOLDER, FORMS, KINDS, check, make, model, points_of, sets_of
-from plates import SMALL, invoke, plate
+from plates import SMALL, invoke, plate, same
 from test_mesh_files import gmsh_4, outcome, write
 
 from skfsink.meshing.mesh_file import read_mesh_file
-from skfsink.meshing.sample import Sample, file_sample
+from skfsink.meshing.sample import file_sample
 from skfsink.meshing.vtu import write_mesh
 
 STORED = sorted(FOLDER.glob("*.msh"))
@@ -35,13 +35,6 @@ def test_files_that_gmsh_writes_now(kind: str, form: str, dim: int, tmp_path: Pa
     pytest.importorskip("gmsh")
     make(tmp_path / "mesh.msh", dim, form, **KINDS[kind])
     check(file_sample(tmp_path / "mesh.msh"), sets_of(kind, form))
-
-
-def same(one: Sample, two: Sample) -> bool:
-    """Whether two samples are the same numbers, of which the same bytes of results follow."""
-    return (np.array_equal(one.space.X, two.space.X) and np.array_equal(one.space.conn, two.space.conn)
-            and all(a.keys() == b.keys() and all(np.array_equal(a[name], b[name]) for name in a)
-                    for a, b in ((one.boundaries, two.boundaries), (one.cells, two.cells))))
 
 
 @pytest.mark.parametrize("path", STORED, ids=NAMES)

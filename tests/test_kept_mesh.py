@@ -12,7 +12,6 @@ import pytest
 from bodies import box
 from plates import SMALL, contents, figures, forked, invoke, invoke_program, plate
 
-import skfsink.run.compute
 from skfsink.cases.single_edge_notch import single_edge_notch
 from skfsink.meshing import sample as samples
 from skfsink.meshing.kept_mesh import keep_mesh, mesh_name, origin
@@ -24,13 +23,6 @@ from skfsink.scene.options import Options
 
 QUICK = [*SMALL, "--event-time", "2e-6"]
 NAMES = ("left", "gmsh", "region:1", "a/b", 'with "quotes", commas and <tags>', "Größe µ", "x" * 300, "new\tline\n", "")
-
-
-@pytest.fixture
-def plain(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Leave out the pictures."""
-    monkeypatch.setattr(skfsink.run.compute, "draw_run", lambda *_: None)
-    monkeypatch.setattr(skfsink.run.compute, "draw_comparison", lambda *_: None)
 
 
 @pytest.mark.parametrize("kind", ["quad", "hex"])
@@ -56,7 +48,7 @@ def test_a_kept_mesh_reads_as_it_was(kind: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", ["dynamic", "both"])
-def test_a_folder_goes_on_elsewhere_without_its_mesh_file(kind: str, tmp_path: Path, plain: None,
+def test_a_folder_goes_on_elsewhere_without_its_mesh_file(kind: str, tmp_path: Path,
                                                           monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if a killed run needs the original file, or its old place, to be resumed, shown, reported or run again."""
     monkeypatch.chdir(tmp_path)
@@ -91,8 +83,7 @@ def test_a_folder_goes_on_elsewhere_without_its_mesh_file(kind: str, tmp_path: P
     assert "--mesh" in invoke("--resume", "again", "--mesh", "my plate.vtu", "--quiet")[1]  # which is none here
 
 
-def test_regions_and_sides_of_a_scene_of_ones_own_are_kept(tmp_path: Path, plain: None,
-                                                          monkeypatch: pytest.MonkeyPatch) -> None:
+def test_regions_and_sides_of_a_scene_of_ones_own_are_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if a set of elements, or a side that the mesh does not name, is not there without the original file."""
     mesh = plate()
     middle = mesh.points[mesh.cells_dict["quad"]].mean(axis=1)
@@ -112,7 +103,7 @@ def test_regions_and_sides_of_a_scene_of_ones_own_are_kept(tmp_path: Path, plain
     assert invoke_program("resume", "moved", "--quiet")[0] == 0
 
 
-def test_a_mesh_that_gmsh_made_is_kept(tmp_path: Path, plain: None, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_mesh_that_gmsh_made_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if a folder needs gmsh, or the same version of it, to be resumed or shown elsewhere."""
     made = samples._from_meshio("coarse", plate(), made=True)
     with monkeypatch.context() as patch:
@@ -126,7 +117,7 @@ def test_a_mesh_that_gmsh_made_is_kept(tmp_path: Path, plain: None, monkeypatch:
     assert invoke("--resume", tmp_path / "run", "--quiet")[:2] == (0, "")
 
 
-def test_a_named_mesh_is_not_copied(tmp_path: Path, plain: None) -> None:
+def test_a_named_mesh_is_not_copied(tmp_path: Path) -> None:
     """Fails if a mesh that comes with the program fills every folder."""
     options = Options(event_time=1e-7, out=tmp_path / "run", quiet=True)
     made = single_edge_notch(mesh="coarse", options=replace(options, length_scale=0.1))

@@ -15,7 +15,6 @@ from guarded import Stop
 from plates import invoke, plate
 from references import scene_of
 
-import skfsink.run.compute
 from skfsink.cases.single_edge_notch import CASE
 from skfsink.errors import Interrupted, MeshError, OutputError, ParameterError
 from skfsink.fields.crack import CRACKED
@@ -309,7 +308,6 @@ def test_errors_of_paths() -> None:
 
 def test_the_choice_is_printed_and_stored(ladder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if a run does not say which model it took, forgets it in a file, or takes another one when resumed."""
-    monkeypatch.setattr(skfsink.run.compute, "draw_run", lambda *_: None)
     monkeypatch.chdir(tmp_path)
     flags = ["--mesh", "coarse", "--model", "onset"]
     status, err, _ = invoke(*flags)

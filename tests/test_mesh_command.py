@@ -10,7 +10,7 @@ from pathlib import Path
 import meshio
 import numpy as np
 import pytest
-from plates import contents, invoke_program, plate
+from plates import contents, invoke_program, plate, sample_of
 
 from skfsink.errors import MeshError, ParameterError
 from skfsink.meshing.files.convert import converted
@@ -358,7 +358,6 @@ def test_a_run_names_the_command(tmp_path: Path) -> None:
 def test_a_run_on_a_converted_mesh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if a converted mesh cannot be run, or its boundaries are not those of the file."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("skfsink.run.compute.draw_run", lambda *_: None)
     write_mesh(tmp_path / "plate.vtu", triangles(mixed=True))
     status, err, out = invoke_program("mesh", "plate.vtu", "ready.vtu", "--length-scale", "0.4")
     assert (status, err) == (0, "") and "128 quadrilaterals" in out and "upper" in out and "notch" in out
@@ -389,15 +388,9 @@ def test_repairs(tmp_path: Path) -> None:
                  "24 quadrilaterals", "4 x 4 mm"):
         assert part in out, part
     sample = file_sample(tmp_path / "out.vtu")
-    assert sample.space.V.sum() == pytest.approx(file_sample_of(tmp_path, plate(5)).space.V.sum())
+    assert sample.space.V.sum() == pytest.approx(sample_of(tmp_path, plate(5)).space.V.sum())
     assert np.array_equal(sample.nodes("roof"), sample.nodes("top"))
     assert np.array_equal(sample.nodes("sides"), np.union1d(sample.nodes("left"), sample.nodes("right")))
-
-
-def file_sample_of(folder: Path, mesh: meshio.Mesh) -> Sample:
-    """The sample of a mesh written to a file."""
-    write_mesh(folder / "mesh.vtu", mesh)
-    return file_sample(folder / "mesh.vtu")
 
 
 def test_sets_survive_the_file(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import meshio
 import numpy as np
 import pytest
-from plates import contents, invoke_program, plate
+from plates import contents, invoke_program, plate, same, sample_of
 
 from skfsink.errors import MeshError
 from skfsink.meshing.files.pieces import hinges, merged
@@ -16,12 +16,6 @@ from skfsink.meshing.files.tidy import base_of, tidied
 from skfsink.meshing.mesh_file import read_mesh_file
 from skfsink.meshing.sample import Sample, file_sample, load_sample
 from skfsink.meshing.vtu import write_mesh
-
-
-def sample_of(folder: Path, mesh: meshio.Mesh) -> Sample:
-    """The sample of a mesh written to a VTU file."""
-    write_mesh(folder / "plate.vtu", mesh)
-    return file_sample(folder / "plate.vtu")
 
 
 def inserted(mesh: meshio.Mesh, at: list[int]) -> meshio.Mesh:
@@ -45,13 +39,6 @@ def second_order(mesh: meshio.Mesh, centre: bool) -> meshio.Mesh:
     kinds = [("quad9", cells) if centre else ("quad8", cells[:, :8]), ("line3", curves)]
     return meshio.Mesh(points if centre else points[:len(mesh.points) + len(edges)], kinds, cell_sets=mesh.cell_sets,
                        point_sets={"held": np.unique(curves[mesh.cell_sets["top"][1]])})
-
-
-def same(one: Sample, other: Sample) -> bool:
-    """Whether two samples have the same arrays, to the last bit."""
-    return (one.space.X.tobytes() == other.space.X.tobytes() and one.space.conn.tobytes() == other.space.conn.tobytes()
-            and one.boundaries.keys() == other.boundaries.keys()
-            and all(np.array_equal(one.nodes(name), other.nodes(name)) for name in one.boundaries))
 
 
 def test_nodes_of_no_element_change_nothing(tmp_path: Path) -> None:
@@ -209,7 +196,6 @@ def test_merged_pieces_are_the_whole(tmp_path: Path) -> None:
 def test_merge_nodes_in_a_deck(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if the option of a deck does not reach the mesh, is not kept by the run, or takes another unit."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("skfsink.run.compute.draw_run", lambda *_: None)
     write_mesh(tmp_path / "parts.vtu", beside(grid(2, 3), grid(2, 3, (1, 0))))
     text = ('case = "custom"\n[parameters]\nmesh = "parts.vtu"\nlength_scale = 1\nevent_time = 1e-7\n{}\n[[grips]]\n'
             'boundary = "left"\nx = 0\ny = 0\n[[grips]]\nboundary = "right"\nx = 1e-3\ny = 0\n')

@@ -12,11 +12,10 @@ from pathlib import Path
 
 import filelock
 import pytest
-from plates import SMALL, contents, forked, invoke, plate
+from plates import SMALL, contents, forked, invoke
 
 import skfsink.run.compute
 from skfsink.errors import OutputError
-from skfsink.meshing.vtu import write_mesh
 from skfsink.run.occupied import HOLDER, LOCK, occupied
 
 QUICK = [*SMALL, "--event-time", "1e-6"]
@@ -24,23 +23,8 @@ QUICK = [*SMALL, "--event-time", "1e-6"]
 system_locks = pytest.mark.skipif(os.name != "nt" and not filelock.has_fcntl, reason="the system locks no files")
 
 
-@pytest.fixture(scope="module")
-def mesh(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """File of the small plate."""
-    path = tmp_path_factory.mktemp("mesh") / "plate.vtu"
-    write_mesh(path, plate())
-    return path
-
-
-@pytest.fixture
-def plain(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Leave out the pictures."""
-    monkeypatch.setattr(skfsink.run.compute, "draw_run", lambda *_: None)
-    monkeypatch.setattr(skfsink.run.compute, "draw_comparison", lambda *_: None)
-
-
 @system_locks
-def test_a_second_run_is_refused_while_the_first_one_goes_on(mesh: Path, tmp_path: Path, plain: None) -> None:
+def test_a_second_run_is_refused_while_the_first_one_goes_on(mesh: Path, tmp_path: Path) -> None:
     """Fails if two runs write to one folder, if the line does not say whose it is, or a killed run keeps its folder."""
     out = tmp_path / "out"
     arguments = ["--mesh", mesh, "--out", out, *SMALL, "--checkpoint-every", "0.01"]
@@ -63,7 +47,7 @@ def test_a_second_run_is_refused_while_the_first_one_goes_on(mesh: Path, tmp_pat
     assert not {LOCK, HOLDER} & {path.name for path in out.rglob("*")}
 
 
-def test_a_part_of_two_runs_is_in_use(mesh: Path, tmp_path: Path, plain: None) -> None:
+def test_a_part_of_two_runs_is_in_use(mesh: Path, tmp_path: Path) -> None:
     """Fails if one of two runs can be resumed alone while both are under way, or both while one is."""
     out = tmp_path / "out"
     arguments = ["--mesh", mesh, "--out", out, "--analysis", "both", *QUICK]
@@ -97,8 +81,7 @@ def test_a_lock_leaves_nothing_and_disturbs_nothing(tmp_path: Path) -> None:
     assert contents(tmp_path) == {}
 
 
-def test_a_folder_that_cannot_be_locked(mesh: Path, tmp_path: Path, plain: None,
-                                        monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_folder_that_cannot_be_locked(mesh: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if a file system without locks ends a run, or goes without a word."""
     def fails(*_: object, **__: object) -> None:
         raise OSError(38, "Function not implemented")

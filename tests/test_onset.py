@@ -313,7 +313,7 @@ def run(folder: Path, shape: tuple[int, int], size: tuple[float, float], l: floa
     return found
 
 
-def test_loading_and_unloading_is_a_result(tmp_path: Path) -> None:
+def test_loading_and_unloading_is_a_result(tmp_path: Path, pictures: None) -> None:
     """Fails if a body that does not fail is an error, has no frames, or loads with the wrong sign."""
     summary = run(tmp_path, (10, 2), (5.0, 1.0), 0.5, '[["0 s", 0], ["1 s", "0.3 mm"], ["2 s", 0], ["3 s", "0.4 mm"], '
                                                       '["4 s", 0]]')
@@ -371,7 +371,7 @@ def test_runs_that_did_not_fail_are_compared(tmp_path: Path) -> None:
     assert (tmp_path / "out" / "report.html").read_text().count(" nothing failed: ") == 2
 
 
-def test_a_body_of_which_nothing_is_left_is_a_result(tmp_path: Path) -> None:
+def test_a_body_of_which_nothing_is_left_is_a_result(tmp_path: Path, pictures: None) -> None:
     """Fails if frames without an element cannot be drawn: under a dead load an even strip is spent to the last."""
     pull = '[["0 s", 0], ["10 s", "10 MPa"]]'
     summary = run(tmp_path, (4, 1), (2.0, 0.5), 0.5, pull, "quasistatic", head=HEAD.replace(
@@ -382,7 +382,7 @@ def test_a_body_of_which_nothing_is_left_is_a_result(tmp_path: Path) -> None:
     assert not any("without a first arrival" in text for text in summary["warnings"])
 
 
-def test_a_material_point_fails_everywhere_at_once(tmp_path: Path) -> None:
+def test_a_material_point_fails_everywhere_at_once(tmp_path: Path, pictures: None) -> None:
     """Fails if the curve of one element ends in an error, or is not beside the theory."""
     summary = run(tmp_path, (1, 1), (1.0, 1.0), 1.0, '"1e-3 mm/s"', "quasistatic")
     assert summary["verdict"].startswith("failed everywhere at once, in pass ")

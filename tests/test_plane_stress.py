@@ -6,7 +6,7 @@ import inspect
 
 import numpy as np
 import pytest
-from bodies import boundary, box, distorted, ends, grid, grips, held_body, notched, patchy, wavy
+from bodies import boundary, box, close, distorted, ends, grid, grips, held_body, notched, patchy, wavy
 from plates import plate
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
@@ -46,13 +46,6 @@ def sheet(space: Space, gamma: np.ndarray | float = 1.0, material: Material | No
     momentum.gamma = np.broadcast_to(gamma, space.w.shape).copy()
     momentum.backend.set_gamma(momentum.gamma)
     return momentum
-
-
-def close(got: np.ndarray, expected: np.ndarray, tolerance: float = ROUNDING) -> None:
-    """Largest difference relative to the largest entry."""
-    assert got.shape == expected.shape
-    error = abs(got - expected).max() / abs(expected).max()
-    assert error <= tolerance, f"relative difference {error:.2e}"
 
 
 # --- the stretch across the sheet ---

@@ -29,21 +29,6 @@ RUNS = {"explicit": [], "short": ["--event-time", "3e-5"], "quasistatic": ["--an
         "hht": ["--integrator", "hht", "--event-time", "3e-5"], "both": ["--analysis", "both", "--event-time", "2e-5"]}
 
 
-@pytest.fixture(scope="module")
-def mesh(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """File of the small plate."""
-    path = tmp_path_factory.mktemp("mesh") / "plate.vtu"
-    write_mesh(path, plate())
-    return path
-
-
-@pytest.fixture
-def plain(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Leave out the pictures."""
-    monkeypatch.setattr(skfsink.run.compute, "draw_run", lambda *_: None)
-    monkeypatch.setattr(skfsink.run.compute, "draw_comparison", lambda *_: None)
-
-
 def histories(folder: Path) -> dict[str, bytes]:
     """The histories below a folder, and the other tables."""
     return {name: content for name, content in contents(folder).items() if name.endswith(".csv")}
@@ -66,7 +51,7 @@ def some_slow(fast: list[object], slow: list[object]) -> list[object]:
 
 @pytest.mark.parametrize("kind, seed", some_slow([("short", 0), ("quasistatic", 0), ("both", 0)],
                                                  [(kind, 1) for kind in RUNS]))
-def test_killed_runs_end_the_same(kind: str, seed: int, mesh: Path, tmp_path: Path, plain: None) -> None:
+def test_killed_runs_end_the_same(kind: str, seed: int, mesh: Path, tmp_path: Path) -> None:
     """Fails if anything a step depends on is not in the checkpoint, or a file is at any moment a part of itself.
 
     The kills come at the operations on files, in all phases, many times in a row.
@@ -112,18 +97,18 @@ def test_interrupted_runs_say_how_to_go_on(kind: str, number: signal.Signals, me
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_interrupted_while_drawing(number: signal.Signals, mesh: Path, tmp_path: Path, plain: None,
+def test_interrupted_while_drawing(number: signal.Signals, mesh: Path, tmp_path: Path,
                                    monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if a signal outside of the stepping is a traceback, or a kill without a word."""
     out = tmp_path / "out"
     monkeypatch.setattr(skfsink.run.compute, "draw_run", lambda *_: os.kill(os.getpid(), number))
     arguments = ["--mesh", mesh, "--out", out, "--event-time", "1e-6", *SMALL]
     assert forked(arguments) == (130, f"skfsink: interrupted; go on with skfsink resume {out}\n")
-    monkeypatch.setattr(skfsink.run.compute, "draw_run", lambda *_: None)
+    monkeypatch.undo()
     assert forked(["--resume", out, "--quiet"]) == (0, "") and figures(out)["event"]["duration_s"] >= 1e-6
 
 
-def test_resuming_a_finished_run_draws_it_again(mesh: Path, tmp_path: Path, plain: None) -> None:
+def test_resuming_a_finished_run_draws_it_again(mesh: Path, tmp_path: Path) -> None:
     """Fails if a finished run is stepped on, recorded twice, or refused."""
     out = tmp_path / "out"
     assert invoke("--mesh", mesh, "--out", out, *SMALL, *RUNS["short"])[0] == 0
@@ -137,7 +122,7 @@ def test_resuming_a_finished_run_draws_it_again(mesh: Path, tmp_path: Path, plai
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["explicit", "both"])
-def test_processes_killed_by_the_clock(kind: str, mesh: Path, tmp_path: Path) -> None:
+def test_processes_killed_by_the_clock(kind: str, mesh: Path, tmp_path: Path, pictures: None) -> None:
     """Fails as `test_killed_runs_end_the_same` does, but for real: kills at any moment, with pictures."""
     arguments = ["--mesh", mesh, "--checkpoint-every", "0.2", *SMALL, *RUNS[kind]]
     program = [sys.executable, "-m", "skfsink.cases.single_edge_notch"]
@@ -162,16 +147,14 @@ def test_processes_killed_by_the_clock(kind: str, mesh: Path, tmp_path: Path) ->
 
 # --- refusals ---
 @pytest.fixture(scope="module")
-def stopped(mesh: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def stopped(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with its own `plate.vtu`, and runs stopped in the event: `run`, `both` (in the second part), `other`."""
     top = tmp_path_factory.mktemp("stopped")
-    shutil.copy(mesh, top)
+    write_mesh(top / "plate.vtu", plate())
     short = ["--mesh", top / "plate.vtu", *SMALL, "--event-time", "1e-5", "--checkpoint-every", "1e-9"]
     assert forked([*short, "--out", top / "run"], 145)[0] == -9
     assert forked([*short, "--out", top / "other", "--phi", "0.2"], 100)[0] == -9
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(skfsink.run.compute, "draw_run", lambda *_: None)
-        assert forked([*short, "--out", top / "both", "--analysis", "both"], 275)[0] == -9
+    assert forked([*short, "--out", top / "both", "--analysis", "both"], 275)[0] == -9
     assert (top / "both" / "quasistatic" / "checkpoint.npz").exists()
     return top
 
@@ -270,7 +253,7 @@ def test_checkpoint_of_another_version(stopped: Path, monkeypatch: pytest.Monkey
     refused(stopped, "0.0.9", "--resume", stopped / "run")
 
 
-def test_equal_parameters_beside_resume_and_any_working_folder(stopped: Path, tmp_path: Path, plain: None,
+def test_equal_parameters_beside_resume_and_any_working_folder(stopped: Path, tmp_path: Path,
                                                                monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if parameters that agree are refused, or if a run finds its mesh only from where it was started."""
     monkeypatch.chdir(tmp_path)

@@ -17,13 +17,12 @@ from typing import Any
 import numpy as np
 import pytest
 import skfem
-from plates import SMALL, contents, forked, invoke, plate
+from plates import SMALL, contents, forked, invoke
 
 import skfsink.run.compute
 import skfsink.run.memory
 from skfsink.fem.space import Space
 from skfsink.fields.momentum import Momentum
-from skfsink.meshing.vtu import write_mesh
 from skfsink.run.checkpoint import load_checkpoint
 from skfsink.run.display import Interrupt
 from skfsink.run.memory import LIMIT, available, estimate, factor_entries
@@ -31,13 +30,6 @@ from skfsink.run.observers.observer import Observers
 from skfsink.scene.registry import read_scene
 
 REFERENCES = sorted((Path(__file__).resolve().parents[1] / "cases").glob("*/reference/*/summary.json"))
-
-
-@pytest.fixture
-def mesh(tmp_path: Path) -> Path:
-    """File of the small plate."""
-    write_mesh(tmp_path / "plate.vtu", plate())
-    return tmp_path / "plate.vtu"
 
 
 # --- memory ---
@@ -136,8 +128,6 @@ def test_signals_outside_of_the_steps(place: str, mesh: Path, tmp_path: Path, mo
         os.kill(os.getpid(), signal.SIGTERM)
         return call(*arguments)
 
-    for drawing in ("draw_run", "draw_comparison"):
-        monkeypatch.setattr(skfsink.run.compute, drawing, lambda *_: None)
     arguments = ["--mesh", mesh, "--out", out, "--analysis", "both", "--event-time", "1e-6", *SMALL]
     monkeypatch.setattr(owner, name, hit)
     status, text = forked(arguments)
@@ -204,7 +194,6 @@ def test_writing_fails(number: int, after: int, mesh: Path, tmp_path: Path, monk
     """Fails if a file that cannot be written is a traceback, or costs the checkpoint that was there."""
     out = tmp_path / "out"
     arguments = ["--mesh", mesh, "--event-time", "5e-6", "--checkpoint-every", "1e-9", *SMALL]
-    monkeypatch.setattr(skfsink.run.compute, "draw_run", lambda *_: None)
     with monkeypatch.context() as patch:
         patch.setattr(os, "fsync", tight(os.fsync, after, number))
         status, err, _ = invoke(*arguments, "--out", out)
@@ -229,10 +218,9 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
         subprocess.run(["umount", "-l", str(path)], check=True)
 
 
-def test_a_disk_that_is_full(small_disk: Path, mesh: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_disk_that_is_full(small_disk: Path, mesh: Path, tmp_path: Path) -> None:
     """Fails if a real disk without room is a traceback, or costs the last checkpoint."""
     out = small_disk / "out"
-    monkeypatch.setattr(skfsink.run.compute, "draw_run", lambda *_: None)
     arguments = ["--mesh", mesh, "--event-time", "2e-5", "--frame-every", "1e-7", "--record-every", "1e-7",
                  "--checkpoint-every", "0.01", *SMALL]
     status, err = forked([*arguments, "--out", out])
@@ -256,7 +244,6 @@ def test_folders_that_vanish(away: str, mesh: Path, tmp_path: Path, monkeypatch:
         mark(self, *arguments)
 
     monkeypatch.setattr(Observers, "step", moved)
-    monkeypatch.setattr(skfsink.run.compute, "draw_run", lambda *_: None)
     status, err = forked(["--mesh", mesh, "--out", out, "--event-time", "2e-5", "--frame-every", "1e-6",
                           "--checkpoint-every", "0.01", *SMALL])
     assert status == 2 and err.startswith("skfsink: cannot write ") and "No such file" in err, err

@@ -17,7 +17,6 @@ import pytest
 from bodies import Weight
 from plates import SMALL, invoke, plate
 
-import skfsink.run.compute
 from skfsink.cases.single_edge_notch import CASE, single_edge_notch
 from skfsink.errors import CheckpointError, MeshError, OutputError, ParameterError, require
 from skfsink.fields.state import State
@@ -35,13 +34,6 @@ from skfsink.scene.stored import StoredScene
 OWN = {name: p.default for name, p in inspect.signature(single_edge_notch).parameters.items() if name != "options"}
 
 
-@pytest.fixture
-def mesh(tmp_path: Path) -> Path:
-    """File of the small plate."""
-    write_mesh(tmp_path / "plate.vtu", plate())
-    return tmp_path / "plate.vtu"
-
-
 def scene(mesh: Path, **options: Any) -> Scene:
     """The case on that mesh."""
     return CASE.scene({**OWN, "mesh": str(mesh)}, Options(**options))
@@ -52,7 +44,6 @@ def scene(mesh: Path, **options: Any) -> Scene:
 def test_scene_file_is_enough_to_run_again(arguments: list[str], mesh: Path, tmp_path: Path,
                                            monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if a parameter that decides the result is missing from scene.toml, or loses a bit in it."""
-    monkeypatch.setattr(skfsink.run.compute, "draw_run", lambda *_: None)
     monkeypatch.chdir(tmp_path)  # the mesh is given relative to it
     assert invoke("--mesh", mesh.name, "--out", "first", *SMALL, *arguments)[0] == 0
     parameters = tomllib.loads((tmp_path / "first" / "scene.toml").read_text())["parameters"]

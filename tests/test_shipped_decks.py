@@ -39,9 +39,8 @@ def beside(name: str, script: str) -> ModuleType:
     return module
 
 
-def loaded(name: str, mesh: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> Result:
+def loaded(name: str, mesh: str, folder: Path) -> Result:
     """A deck on one of its meshes at its onset, and some nanoseconds more."""
-    monkeypatch.setattr(skfsink.run.compute, "draw_run", lambda *_: None)
     text = shipped_decks()[name].read_text()
     text = re.sub(r'(?m)^mesh = "[^"]*"', f'mesh = "{data_folder(name) / "meshes" / mesh}.vtu"', text)
     deck = folder / "deck.toml"
@@ -117,7 +116,6 @@ def test_a_name_stands_for_a_deck(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 def test_commands_take_names(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if `list` leaves a deck out, or `run` and `sweep` do not compute the deck of a name, in its folder."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(skfsink.run.compute, "draw_run", lambda *_: None)
     status, _, out = invoke_program("list")
     assert status == 0 and all(name in out for name in DECKS)
     for command in (("run", "nothing"), ("sweep", "nothing", "--vary", "m=10")):
@@ -150,7 +148,7 @@ def test_hole_against_the_radially_symmetric_solution(tmp_path: Path, monkeypatc
     somewhat more than the limiter: a length l of the body has to reach it, and the energy falls with R^-4.
     """
     exact = beside("biaxial_hole", "closed_form")
-    result = loaded("biaxial_hole", "coarse", tmp_path, monkeypatch)
+    result = loaded("biaxial_hole", "coarse", tmp_path)
     sides = result.summary["onset"]["displacement_mm"] / 2
     hole = exact.moved_by(sides)
     space, phi = result.scene.sample.space, SinkLaw().phi
@@ -171,7 +169,7 @@ def test_stress_concentration_of_the_solution() -> None:
 def test_strip_stores_the_energy_of_pure_shear(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if the strip ahead of the cut is not in pure shear, or the arms beside the cut bear load: G is not W H."""
     tearing = beside("pure_shear", "tearing")
-    result = loaded("pure_shear", "cut2", tmp_path, monkeypatch)
+    result = loaded("pure_shear", "cut2", tmp_path)
     space, W = result.scene.sample.space, result.state.W_max
     x = space.X[space.conn].mean(axis=1)[:, 0]
     expected = tearing.stored(1 + result.summary["onset"]["displacement_mm"] / 1.5)

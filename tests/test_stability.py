@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import scipy.linalg as la
-from bodies import boundary, box, ends, held_body
-from test_density import crack
+from bodies import boundary, box, crack, ends, held_body
 
 from skfsink.fem.pattern import Pattern
 from skfsink.fields.density import DensitySolver

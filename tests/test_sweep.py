@@ -257,7 +257,6 @@ def test_a_worker_that_is_killed_loses_nothing_and_repeats_nothing(
 
 def test_a_sweep_goes_on_elsewhere(deck: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if a sweep that was moved is taken for another one, needs the mesh of begun runs, or takes another mesh."""
-    monkeypatch.setattr(skfsink.run.compute, "draw_run", lambda *_: None)
     here, far = tmp_path / "here", tmp_path / "far"
     here.mkdir(), far.mkdir()
     for name in ("plate.vtu", "scene.toml"):

@@ -1,0 +1,95 @@
+"""Energies of a run from its fields alone, by the formulas of the materials: what a ledger is held against."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from skfsink.fields.body import Body
+from skfsink.fields.momentum import Momentum
+from skfsink.fields.state import State
+
+
+class Moment(NamedTuple):
+    """The fields of a state, as far as its energies need them.
+
+    Attributes
+    ----------
+    time: [s], or the number of the pass.
+    gamma: relative density at the Gauss points, without what bears no force, (ne, nq).
+    W: stored energy [MPa] there, zero where gamma is, (ne, nq).
+    mass, half_v2: lumped mass [t/mm], without a floor, and |v|^2/2 [mm^2/s^2] of the nodes, (n,).
+    """
+
+    time: float
+    gamma: np.ndarray
+    W: np.ndarray
+    mass: np.ndarray
+    half_v2: np.ndarray
+
+
+@dataclass(frozen=True)
+class Energies:
+    """Energies of states of a body with the element `jbar`, without its loops and its ledger."""
+
+    body: Body
+
+    @property
+    def momentum(self) -> Momentum:
+        """The balance whose materials and regions these are."""
+        return self.body.momentum
+
+    def density(self, state: State) -> np.ndarray:
+        """Gauss point densities of a state, zero in deleted elements and below the force floor, (ne, nq)."""
+        gamma = np.einsum("qa,ea->eq", self.body.space.N, state.gamma[self.body.space.conn])
+        gamma[(gamma < self.momentum.force_floor) | state.deleted[:, None]] = 0.0
+        return gamma
+
+    def stored(self, u: np.ndarray, gamma: np.ndarray) -> np.ndarray:
+        """Energy density W [MPa] at the displacement `u` (n, dim), zero where `gamma` (ne, nq) is, (ne, nq)."""
+        space, W = self.body.space, np.zeros(gamma.shape)
+        F = space.deformation_gradient(u)
+        J = np.linalg.det(F)
+        J_bar = np.broadcast_to(space.element_mean(J)[:, None], J.shape)
+        for part in self.momentum.parts:
+            here = gamma > 0
+            if part.elements is not None:
+                here[np.setdiff1d(np.arange(space.n_elements), part.elements)] = False
+            W[here] = part.material.energy(F[here], J_bar[here])
+        return W
+
+    def of(self, state: State) -> Moment:
+        """The moment of a state."""
+        gamma = self.density(state)
+        mass = self.body.space.lump(gamma * self.momentum.rho0)
+        return Moment(state.time, gamma, self.stored(state.u, gamma), mass, 0.5 * (state.v**2).sum(axis=1))
+
+    def elastic(self, moment: Moment) -> float:
+        """Stored energy."""
+        return float((self.body.space.w * moment.gamma * moment.W).sum())
+
+    def kinetic(self, moment: Moment) -> float:
+        """Kinetic energy."""
+        return float(moment.mass @ moment.half_v2)
+
+    def taken(self, moments: Iterable[Moment]) -> tuple[float, float]:
+        """D in its two parts: the integral of -gamma_dot (W + rho0 |v|^2/2) over the body and over `moments`.
+
+        Between two of them the energy is the mean by the densities: what is gone at the second has that of the first.
+        """
+        w = self.body.space.w
+        stored = kinetic = 0.0
+        for one, two in pairwise(moments):
+            stored += float((w * (one.gamma - two.gamma) * _mean(one.gamma, one.W, two.gamma, two.W)).sum())
+            kinetic += float(((one.mass - two.mass) * _mean(one.mass, one.half_v2, two.mass, two.half_v2)).sum())
+        return stored, kinetic
+
+
+def _mean(m0: np.ndarray, q0: np.ndarray, m1: np.ndarray, q1: np.ndarray) -> np.ndarray:
+    """Mean of a quantity by two densities, zero where both are."""
+    both = m0 + m1
+    return np.divide(m0 * q0 + m1 * q1, both, out=np.zeros_like(both), where=both > 0)
