@@ -127,7 +127,7 @@ def test_a_body_that_was_used_is_as_good_as_a_new_one(name: str, fracture: Fract
         pass
     assert other.deleted.any()
     for body in (new(), used):
-        for state in islice(METHODS[name](body, fracture.fresh()), 12 if name in ("passes", "loading") else 60):
+        for _ in islice(METHODS[name](body, fracture.fresh()), 12 if name in ("passes", "loading") else 60):
             pass
         ends.append(state)
     one, two = (state.stored() for state in ends)
