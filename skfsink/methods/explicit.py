@@ -20,6 +20,7 @@ the change of stored energy at fixed gamma, less the last term: that is what the
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
@@ -83,6 +84,11 @@ class Explicit:
         self._urgent = False
         self._since_gamma = 0
         self._zones: tuple[Zone, ...] = ()
+
+    @classmethod
+    def of(cls, body: Body, controls: Any) -> Explicit:
+        """The integrator of a body, with its options among the :class:`.Controls`."""
+        return cls(body, controls.explicit)
 
     def start(self, state: State) -> None:
         """Forces, masses and accelerations of `state`; to be called once before stepping, and after a resume."""

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
@@ -70,6 +71,11 @@ class HHT:
         self._rate = np.zeros_like(self.space.X)  # du/dt of the last step
         self.rejected = self.iterations = 0
         self._cut = False  # whether a step was cut because a crack ran through it
+
+    @classmethod
+    def of(cls, body: Body, controls: Any) -> HHT:
+        """The integrator of a body, with its options among the :class:`.Controls`."""
+        return cls(body, controls.hht)
 
     @property
     def reaction(self) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any, Protocol
 
 import numpy as np
@@ -17,6 +17,11 @@ __all__ = ["INTEGRATORS", "Integrator"]
 
 class Integrator(Protocol):
     """What a run asks of an integrator: it advances a :class:`.State` in place."""
+
+    @classmethod
+    def of(cls, body: Body, controls: Any) -> Integrator:
+        """The integrator of a body; `controls` are the :class:`.Controls` of its scene."""
+        raise NotImplementedError
 
     @property
     def dt(self) -> float:
@@ -49,5 +54,4 @@ class Integrator(Protocol):
         """Go on with the same bits where :meth:`memory` was taken."""
 
 
-#: makers of an integrator by name, from the body and the options of that name in :class:`.Controls`
-INTEGRATORS: dict[str, Callable[[Body, Any], Integrator]] = {"explicit": Explicit, "hht": HHT}
+INTEGRATORS: dict[str, type[Integrator]] = {"explicit": Explicit, "hht": HHT}

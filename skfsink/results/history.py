@@ -7,61 +7,74 @@ import io
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..errors import OutputError
 from ..system.files import reported, write_atomic
 
-__all__ = ["HISTORY_COLUMNS", "History", "Table", "deletions_header", "history_header", "history_units",
+__all__ = ["HISTORY_COLUMNS", "Column", "History", "Table", "deletions_header", "history_header", "history_units",
            "load_name", "onset_load"]
 
-#: Columns of a history, in order, with their meaning. Energies are those of :class:`.energy.Ledger`.
-HISTORY_COLUMNS: dict[str, str] = {
-    "phase": "phase of the run",
-    "step": "load increments, passes or time steps taken in the phase",
-    "time_s": "time since the start of the phase; 0 in passes, which have none",
-    "grip_displacement_mm": "displacement of a grip",
-    "reaction_N_per_mm": "force on a grip along its motion",
-    "elastic": "gamma-weighted stored energy",
-    "loads": "potential of the dead loads",
-    "kinetic": "gamma-weighted kinetic energy",
-    "work": "work of the grips, and of dead loads that change",
-    "sink_stored": "stored energy taken by the sink, the first part of D",
-    "sink_kinetic": "kinetic energy taken by the sink, the second part of D",
-    "deletion": "energy left in elements when they were deleted",
-    "numerical": "dissipation of the time integration",
-    "released": "energy given up in relaxing to equilibrium",
-    "U_paper": "U of the paper (Eq. 30, 32)",
-    "balance": "what the energies fail to add up to",
-    "tip_x_mm": "position of the leading tip, undeformed",
-    "tip_y_mm": "position of the leading tip, undeformed",
-    "tip_z_mm": "position of the leading tip, undeformed",
-    "crack_length_mm": "length of the crack, undeformed",
-    "tip_speed_m_per_s": "speed of the leading tip",
-    "tips": "tips that advance",
-    "branches": "branches, advancing or arrested",
-    "deleted_elements": "failed elements",
-    "gamma_min": "least relative density of a node",
-    "dt_s": "time step",
+
+class Column(NamedTuple):
+    """A column of a history.
+
+    Attributes
+    ----------
+    meaning: in words.
+    unit: for a plane body: "1" for plain numbers, "" for words. N/mm and N mm/mm are N and N mm for one in space.
+    kind: of its values.
+    """
+
+    meaning: str
+    unit: str = "1"
+    kind: type = float
+
+
+_FORCE, _ENERGY = "N/mm", "N mm/mm"  # of a plane body
+#: Columns of a history, in order. Energies are those of :class:`.energy.Ledger`; what each column says of a run is in
+#: :data:`skfsink.run.observers.history.VALUES`.
+HISTORY_COLUMNS: dict[str, Column] = {
+    "phase": Column("phase of the run", "", str),
+    "step": Column("load increments, passes or time steps taken in the phase", kind=int),
+    "time_s": Column("time since the start of the phase; 0 in passes, which have none", "s"),
+    "grip_displacement_mm": Column("displacement of a grip", "mm"),
+    "reaction_N_per_mm": Column("force on a grip along its motion", _FORCE),
+    "elastic": Column("gamma-weighted stored energy", _ENERGY),
+    "loads": Column("potential of the dead loads", _ENERGY),
+    "kinetic": Column("gamma-weighted kinetic energy", _ENERGY),
+    "work": Column("work of the grips, and of dead loads that change", _ENERGY),
+    "sink_stored": Column("stored energy taken by the sink, the first part of D", _ENERGY),
+    "sink_kinetic": Column("kinetic energy taken by the sink, the second part of D", _ENERGY),
+    "deletion": Column("energy left in elements when they were deleted", _ENERGY),
+    "numerical": Column("dissipation of the time integration", _ENERGY),
+    "released": Column("energy given up in relaxing to equilibrium", _ENERGY),
+    "U_paper": Column("U of the paper (Eq. 30, 32)", _ENERGY),
+    "balance": Column("what the energies fail to add up to", _ENERGY),
+    "tip_x_mm": Column("position of the leading tip, undeformed", "mm"),
+    "tip_y_mm": Column("position of the leading tip, undeformed", "mm"),
+    "tip_z_mm": Column("position of the leading tip, undeformed", "mm"),
+    "crack_length_mm": Column("length of the crack, undeformed", "mm"),
+    "tip_speed_m_per_s": Column("speed of the leading tip", "m/s"),
+    "tips": Column("tips that advance", kind=int),
+    "branches": Column("branches, advancing or arrested", kind=int),
+    "deleted_elements": Column("failed elements", kind=int),
+    "gamma_min": Column("least relative density of a node"),
+    "dt_s": Column("time step", "s"),
 }
 _LATER = ("loads",)  # columns that files of before have not; they are 0 there
-_ENERGIES = ("elastic", "loads", "kinetic", "work", "sink_stored", "sink_kinetic", "deletion", "numerical",
-             "released", "U_paper", "balance")
+_IN_SPACE = {_FORCE: "N", _ENERGY: "N mm"}
 _SUFFIX = {"s": "_s", "mm": "_mm", "m/s": "_m_per_s", "N/mm": "_N_per_mm", "N": "_N", "N mm/mm": "_N_mm_per_mm",
            "N mm": "_N_mm", "1": "", "": ""}
-_COUNTS = ("step", "tips", "branches", "deleted_elements")
-_KIND: dict[str, type] = {**dict.fromkeys(HISTORY_COLUMNS, float), "phase": str, **dict.fromkeys(_COUNTS, int)}
 _MISSING: dict[type, Any] = {str: "", int: 0, float: math.nan}
 
 
 def history_units(dim: int) -> dict[str, str]:
     """Unit of each column for a body of 2 or 3 dimensions: "1" for plain numbers, "" for words."""
-    force, energy = ("N/mm", "N mm/mm") if dim == 2 else ("N", "N mm")
-    own = {name: next((unit for unit in ("m/s", "mm", "s") if name.endswith(_SUFFIX[unit])), "1")
-           for name in HISTORY_COLUMNS}
-    return {**own, "phase": "", "reaction_N_per_mm": force, **dict.fromkeys(_ENERGIES, energy)}
+    in_space = _IN_SPACE if dim == 3 else {}
+    return {name: in_space.get(column.unit, column.unit) for name, column in HISTORY_COLUMNS.items()}
 
 
 def history_header(dim: int) -> list[str]:
@@ -176,7 +189,8 @@ def _known(header: list[str]) -> tuple[list[str], int]:
 def _row(values: Mapping[str, Any]) -> dict[str, Any]:
     if unknown := values.keys() - HISTORY_COLUMNS.keys():
         raise KeyError(f"the history has no column {', '.join(sorted(unknown))}")
-    return {name: kind(values.get(name, 0.0 if name in _LATER else _MISSING[kind])) for name, kind in _KIND.items()}
+    return {name: column.kind(values.get(name, 0.0 if name in _LATER else _MISSING[column.kind]))
+            for name, column in HISTORY_COLUMNS.items()}
 
 
 def _csv(rows: Sequence[Any]) -> str:
@@ -186,4 +200,5 @@ def _csv(rows: Sequence[Any]) -> str:
 
 
 def _columns(values: Mapping[str, Sequence[Any]]) -> dict[str, np.ndarray]:
-    return {name: np.array([kind(value) for value in values[name]], kind) for name, kind in _KIND.items()}
+    return {name: np.array([column.kind(value) for value in values[name]], column.kind)
+            for name, column in HISTORY_COLUMNS.items()}

@@ -186,7 +186,7 @@ class Simulation:
             self._from_rest = LoadingFromRest(self.body, c.hht)
             self.integrator = self._from_rest.integrator
         else:
-            self.integrator = self.view.integrator = INTEGRATORS[c.integrator](self.body, getattr(c, c.integrator))
+            self.integrator = self.view.integrator = INTEGRATORS[c.integrator].of(self.body, c)
         return self.integrator
 
     def _integrate(self) -> None:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping
 from typing import Any
-
-import numpy as np
 
 from ...results.history import History as Rows
 from ...results.history import deletions_header
@@ -13,25 +12,43 @@ from ...system.files import write_atomic
 from .observer import Observer
 from .view import View
 
-__all__ = ["Deletions", "History", "row_of"]
+__all__ = ["VALUES", "Deletions", "History"]
 
 
-def row_of(view: View) -> dict[str, Any]:
-    """The row of a history for a moment of a run, by the names of :data:`.HISTORY_COLUMNS`."""
-    state, tips, ledger = view.state, view.tips, view.state.ledger
-    x = np.full(3, np.nan)
-    x[:tips.position.size] = tips.position
-    timeless = state.phase == "event" and view.quasistatic
-    return {
-        "phase": state.phase, "step": state.step, "time_s": 0.0 if timeless else state.time,
-        "grip_displacement_mm": view.displacement, "reaction_N_per_mm": view.load,
-        "elastic": ledger.elastic, "loads": ledger.loads, "kinetic": ledger.kinetic, "work": ledger.work,
-        "sink_stored": ledger.sink_stored, "sink_kinetic": ledger.sink_kinetic, "deletion": ledger.deletion,
-        "numerical": ledger.numerical, "released": ledger.released, "U_paper": ledger.paper,
-        "balance": ledger.balance, "tip_x_mm": float(x[0]), "tip_y_mm": float(x[1]), "tip_z_mm": float(x[2]),
-        "crack_length_mm": tips.length, "tip_speed_m_per_s": 0.0 if timeless else tips.speed,
-        "tips": tips.active, "branches": tips.branches, "deleted_elements": int(state.deleted.sum()),
-        "gamma_min": float(state.gamma.min()), "dt_s": view.dt}
+def _timeless(view: View) -> bool:
+    """Whether a state belongs to passes, which have no time."""
+    return view.state.phase == "event" and view.quasistatic
+
+
+def _tip(axis: int) -> Callable[[View], float]:
+    """Position of the leading tip along an axis that the body may not have."""
+    return lambda view: float(view.tips.position[axis]) if axis < view.tips.position.size else math.nan
+
+
+def _energy(name: str) -> Callable[[View], float]:
+    """An entry of the ledger."""
+    return lambda view: float(getattr(view.state.ledger, name))
+
+
+#: what each column of :data:`.HISTORY_COLUMNS` says of a run
+VALUES: dict[str, Callable[[View], Any]] = {
+    "phase": lambda view: view.state.phase,
+    "step": lambda view: view.state.step,
+    "time_s": lambda view: 0.0 if _timeless(view) else view.state.time,
+    "grip_displacement_mm": lambda view: view.displacement,
+    "reaction_N_per_mm": lambda view: view.load,
+    **{name: _energy(name) for name in ("elastic", "loads", "kinetic", "work", "sink_stored", "sink_kinetic",
+                                        "deletion", "numerical", "released", "balance")},
+    "U_paper": _energy("paper"),
+    "tip_x_mm": _tip(0), "tip_y_mm": _tip(1), "tip_z_mm": _tip(2),
+    "crack_length_mm": lambda view: view.tips.length,
+    "tip_speed_m_per_s": lambda view: 0.0 if _timeless(view) else view.tips.speed,
+    "tips": lambda view: view.tips.active,
+    "branches": lambda view: view.tips.branches,
+    "deleted_elements": lambda view: int(view.state.deleted.sum()),
+    "gamma_min": lambda view: float(view.state.gamma.min()),
+    "dt_s": lambda view: view.dt,
+}
 
 
 class History(Observer):
@@ -63,7 +80,7 @@ class History(Observer):
 
     def loading(self, view: View) -> None:
         """The row of a load increment."""
-        self._table.append(row_of(view))
+        self._table.append({name: value(view) for name, value in VALUES.items()})
 
     def due(self, view: View) -> bool:
         """At each record, and when the crack arrives."""
@@ -71,7 +88,7 @@ class History(Observer):
 
     def look(self, view: View) -> None:
         """Add a row."""
-        self._table.append(row_of(view))
+        self._table.append({name: value(view) for name, value in VALUES.items()})
 
     def memory(self) -> dict[str, Any]:
         """The rows so far."""
