@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from functools import cache, cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from docstring_parser import parse
 
@@ -18,9 +18,8 @@ from ..units import kind_and_unit
 from .options import OUTSIDE_A_DECK, Options
 from .scene import Scene
 from .stored import TABLES, StoredScene
-
-if TYPE_CHECKING:
-    from .typed import Mistake, Record
+from .tables import read_tables
+from .typed import Mistake, Record
 
 __all__ = ["Case", "CaseParameter", "shared_parameters"]
 
@@ -34,25 +33,28 @@ class CaseParameter:
     Attributes
     ----------
     name: in Python and in decks.
-    kind: type of the value.
+    annotation: of the function, or of :class:`.Options`: its type is the `kind`, and it may have a `unit` such as "mm";
+        that of pure numbers, and of what is no number, is "".
     default: of the case function, or of :class:`.Options`.
-    unit: of the number, such as "mm"; "" for pure numbers and what is no number.
     meaning: one sentence, with unit and range.
     shared: whether all cases have it (a field of :class:`.Options`), or it belongs to the sample.
     """
 
     name: str
-    kind: Any
+    annotation: Any
     default: Any
-    unit: str
     meaning: str
     shared: bool
 
-    @classmethod
-    def of(cls, name: str, annotation: Any, default: Any, meaning: str, *, shared: bool) -> CaseParameter:
-        """The parameter with this annotation, such as `Annotated[float, Unit("mm")]`."""
-        kind, unit = kind_and_unit(annotation)
-        return cls(name, kind, default, unit, meaning, shared)
+    @property
+    def kind(self) -> Any:
+        """Type of the value."""
+        return kind_and_unit(self.annotation)[0]
+
+    @property
+    def unit(self) -> str:
+        """What the number is measured in."""
+        return kind_and_unit(self.annotation)[1]
 
     @property
     def has_tables(self) -> bool:
@@ -106,7 +108,7 @@ class Case:
     def arguments(self) -> tuple[CaseParameter, ...]:
         """Those of the sample: the arguments of the function but for `options`."""
         meanings, signature = _meanings(self.function), inspect.signature(self.function, eval_str=True)
-        return tuple(CaseParameter.of(name, argument.annotation, argument.default, meanings.get(name, ""), shared=False)
+        return tuple(CaseParameter(name, argument.annotation, argument.default, meanings.get(name, ""), shared=False)
                      for name, argument in signature.parameters.items() if name != "options")
 
     @property
@@ -121,11 +123,8 @@ class Case:
 
     @cached_property
     def _record(self) -> Record:
-        from .typed import Record, Text, number  # only decks need them
-
-        texts = {str: Text, bool: bool}
-        return Record({name: texts.get(p.kind, number(p.unit)) for name, p in self.parameters.items()
-                       if not p.has_tables}, _message)
+        return Record({name: parameter.annotation for name, parameter in self.parameters.items()
+                       if not parameter.has_tables}, _message)
 
     def read(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Values of parameters from a deck: text with a unit becomes a number in the unit of the parameter.
@@ -135,8 +134,6 @@ class Case:
         ParameterError
             There is no such parameter, or it has no such value.
         """
-        from .tables import read_tables
-
         plain = self._record.read({name: value for name, value in values.items() if name not in self.tables})
         tables = {name: read_tables(name, values[name]) for name in self.tables if name in values}
         return {name: {**plain, **tables}[name] for name in values}
@@ -166,7 +163,7 @@ class Case:
 
 
 def _message(mistake: Mistake, values: Mapping[str, Any]) -> str:
-    if mistake.kind == "extra_forbidden":
+    if mistake.unknown:
         return f"{mistake.field!r} is no parameter; `skfsink show CASE` lists them"
     if mistake.field == "mesh" and isinstance(mistake.value, str):
         return mistake.text + r": for \ in a path write /, or put the path in single quotes"
@@ -177,7 +174,7 @@ def _message(mistake: Mistake, values: Mapping[str, Any]) -> str:
 def shared_parameters() -> Mapping[str, CaseParameter]:
     """The parameters that all cases have, by name: the options that a deck may have."""
     annotations, meanings = typing.get_type_hints(Options, include_extras=True), _meanings(Options)
-    return {f.name: CaseParameter.of(f.name, annotations[f.name], f.default, meanings[f.name], shared=True)
+    return {f.name: CaseParameter(f.name, annotations[f.name], f.default, meanings[f.name], shared=True)
             for f in fields(Options) if f.name not in OUTSIDE_A_DECK}
 
 

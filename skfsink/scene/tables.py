@@ -10,18 +10,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from functools import partial
 from typing import Annotated, Any, get_type_hints
 
-from pydantic import AfterValidator, Discriminator, Field, Tag, ValidationInfo
-
-from ..errors import ParameterError
+from ..errors import ParameterError, require
 from ..loads.grips import Grip, Ramp, Traction
 from ..material import MATERIALS, own_constants
 from ..material.regions import RegionLaw, one_bulk_modulus
-from ..units import kind_and_unit
-from .typed import Mistake, Record, Text, number
+from ..units import number_in
+from .typed import Mistake, Record
 
 __all__ = ["grips_of", "read_tables", "regions_of", "tractions_of"]
 
@@ -29,43 +27,46 @@ AXES = ("x", "y", "z")
 MOST = 1000  # tables of a kind, points of a ramp
 
 
-def _ramp(points: list[tuple[float, float]], info: ValidationInfo) -> list[list[float]]:
-    try:
-        return _plain(Ramp(*zip(*points)) if points else Ramp((), ()))
-    except ParameterError as error:
-        raise ValueError(f"{info.field_name}: {error}") from None
+@dataclass(frozen=True)
+class Course:
+    """Mark in the annotation of a component: a number in the unit `rate`, or a ramp of points [time, value in `unit`].
+    """
 
+    rate: str
+    unit: str
 
-def _course(rate: str, unit: str) -> Any:
-    """Type of a component: a number in the unit `rate`, or a ramp of points [time, value in `unit`]."""
-    time, value = number("s", finite=True), number(unit, finite=True)
-    point = Annotated[tuple[time, value], Field(strict=False)]  # type: ignore[valid-type]
-    ramp = Annotated[list[point], Field(strict=False, max_length=MOST), AfterValidator(_ramp)]
-    either = Annotated[number(rate, finite=True), Tag("rate")] | Annotated[ramp, Tag("ramp")]  # type: ignore[valid-type, misc]
-    return Annotated[either, Discriminator(lambda course: "ramp" if isinstance(course, list | tuple) else "rate")]
+    def read(self, value: Any) -> float | list[list[float]]:
+        """The component in plain numbers; the ParameterError is to follow its name."""
+        if not isinstance(value, list | tuple):
+            return require("", number_in("", value, self.rate), self.rate)
+        if len(value) > MOST or not all(isinstance(point, list | tuple) and len(point) == 2 for point in value):
+            raise ParameterError(f": a ramp has 2 to {MOST} points [time, value]; got {value!r:.80}")
+        times, values = ([require("", number_in("", point[i], unit), unit) for point in value]
+                         for i, unit in enumerate(("s", self.unit)))
+        try:
+            return _plain(Ramp(tuple(times), tuple(values)))
+        except ParameterError as error:
+            raise ParameterError(f": {error}") from None
 
 
 def _message(kind: str, mistake: Mistake, table: Any) -> str:
-    key, field = next(iter(TYPES[kind])), mistake.field
-    if not field:
+    key = next(iter(TYPES[kind]))
+    if not mistake.field:
         return f"{kind} must be tables; got {table!r:.80}"
-    if mistake.kind == "extra_forbidden":
-        return f"{kind}: {field!r} is none of {', '.join(TYPES[kind])}"
-    if field == key:
-        return f"{kind}: {key} must be a name; got {table.get(key)!r:.80}"
-    where = f"{kind.removesuffix('s')} {table[key]}, "
-    if mistake.kind in ("value_error", "string_type"):
-        return where + mistake.text
-    return f"{where}{field}: a ramp has 2 to {MOST} points [time, value]; got {table[field]!r:.80}"
+    if mistake.unknown:
+        return f"{kind}: {mistake.field!r} is none of {', '.join(TYPES[kind])}"
+    if mistake.field == key:
+        return f"{kind}: {key} must be a name; got {mistake.value!r:.80}"
+    return f"{kind.removesuffix('s')} {table[key]}, {mistake.text}"
 
 
 #: the fields of a table of each kind; the first names it, and those left out are free, zero, or as in the body
 TYPES: Mapping[str, Mapping[str, Any]] = {
-    "grips": {"boundary": Text, **dict.fromkeys(AXES, _course("mm/s", "mm"))},
-    "tractions": {"boundary": Text, **dict.fromkeys(AXES, _course("MPa/s", "MPa"))},
-    "regions": {name: Text if hint is str else number(kind_and_unit(hint)[1], finite=True)
-                for name, hint in get_type_hints(RegionLaw, include_extras=True).items()}}
-RECORDS = {kind: Record(types, partial(_message, kind), [next(iter(types))]) for kind, types in TYPES.items()}
+    "grips": {"boundary": str, **dict.fromkeys(AXES, Annotated[list, Course("mm/s", "mm")])},
+    "tractions": {"boundary": str, **dict.fromkeys(AXES, Annotated[list, Course("MPa/s", "MPa")])},
+    "regions": get_type_hints(RegionLaw, include_extras=True)}
+RECORDS = {kind: Record(types, partial(_message, kind), needed=[next(iter(types))], finite=True)
+           for kind, types in TYPES.items()}
 
 
 def read_tables(kind: str, tables: Any) -> tuple[dict[str, Any], ...]:

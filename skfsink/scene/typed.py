@@ -1,45 +1,16 @@
-"""Records that check what people write into them, by pydantic; what is wrong is said in one line.
-
-Importing pydantic takes a tenth of a second: this module is imported where a deck is read.
-"""
+"""Records that check what people write into them, by cattrs; what is wrong is said in one line."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
-from typing import Annotated, Any, NamedTuple, NotRequired
+from typing import Any, NamedTuple, NotRequired, TypedDict
 
-from pydantic import AfterValidator, BeforeValidator, TypeAdapter, ValidationError, ValidationInfo, with_config
-from typing_extensions import TypedDict
+from cattrs import ClassValidationError, Converter, ForbiddenExtraKeysError
 
 from ..errors import ParameterError, require
-from ..units import number_in
+from ..units import kind_and_unit, number_in
 
-__all__ = ["Mistake", "Record", "Text", "number"]
-
-#: what a value must be, by pydantic's name of the mistake
-MUST_BE = {"string_type": "text", "bool_type": "true or false"}
-
-
-def _printable(text: str, info: ValidationInfo) -> str:
-    if not text.isprintable():
-        raise ValueError(f"{info.field_name} must be text; got {text!r:.80}")
-    return text
-
-
-Text = Annotated[str, AfterValidator(_printable)]
-
-
-def number(unit: str, finite: bool = False) -> Any:
-    """Type of a number as it is, or of text with a unit, which becomes a number in `unit`; a float if it is finite."""
-    def read(value: Any, info: ValidationInfo) -> Any:
-        name = info.field_name or ""
-        try:
-            found = number_in(name, value, unit)
-            return require(name, found, unit) if finite else found
-        except ParameterError as error:
-            raise ValueError(str(error)) from None  # which pydantic gathers
-
-    return Annotated[Any, BeforeValidator(read)]
+__all__ = ["Mistake", "Record"]
 
 
 class Mistake(NamedTuple):
@@ -48,12 +19,12 @@ class Mistake(NamedTuple):
     Attributes
     ----------
     field: its name; "" if it is no record at all.   value: what was found there.
-    kind: pydantic's name of the mistake, such as "extra_forbidden".   text: a line that begins with the field.
+    unknown: whether there is no such field.   text: a line that begins with the name of the field.
     """
 
     field: str
     value: Any
-    kind: str
+    unknown: bool
     text: str
 
 
@@ -62,31 +33,71 @@ class Record:
 
     Parameters
     ----------
-    types: of the fields, by name.
+    types: of the fields, by name, as annotations: `Annotated[float, Unit("mm")]`, `bool`, `str`; or `Annotated` with a
+        mark that has a method `read`, whose ParameterError follows the name of the field.
     message: makes the line of an error from a :class:`Mistake` and what was read.
     needed: names of the fields that may not be left out.
+    finite: whether a number has to be finite, and becomes a float; otherwise it stays as it is.
     """
 
-    def __init__(self, types: Mapping[str, Any], message: Callable[[Mistake, Any], str], needed: Collection[str] = ()
-                 ) -> None:
+    def __init__(self, types: Mapping[str, Any], message: Callable[[Mistake, Any], str], *,
+                 needed: Collection[str] = (), finite: bool = False) -> None:
         fields = {name: kind if name in needed else NotRequired[kind] for name, kind in types.items()}
-        strict = with_config({"extra": "forbid", "strict": True})
-        self._fields = TypeAdapter(strict(TypedDict("Record", fields)))  # type: ignore[operator]
-        self._message = message
+        self._type = TypedDict("Record", fields)  # type: ignore[operator, misc]
+        self._message, self._converter = message, Converter(forbid_extra_keys=True)
+        for kind, hook in ((str, _text), (bool, _flag), (int, _number("", finite)), (float, _number("", finite))):
+            self._converter.register_structure_hook(kind, hook)
+        self._converter.register_structure_hook_factory(
+            lambda kind: kind_and_unit(kind)[1] != "", lambda kind: _number(kind_and_unit(kind)[1], finite))
+        self._converter.register_structure_hook_factory(lambda kind: bool(_readers(kind)), _marked)
 
     def read(self, values: Any) -> dict[str, Any]:
-        """The values as the types have them, in the order of the fields.
+        """The values, with a number for each quantity.
 
         Raises
         ------
         ParameterError
             One of them is not of its type, has no field, or is missing.
         """
+        if not isinstance(values, Mapping):
+            raise ParameterError(self._message(Mistake("", values, False, ""), values))
         try:
-            return self._fields.validate_python(values)  # type: ignore[no-any-return]
-        except ValidationError as error:
-            first = error.errors(include_url=False)[0]
-        field, value, kind = str((*first["loc"], "")[0]), first["input"], first["type"]
-        text = (str(first["ctx"]["error"]) if kind == "value_error" else
-                f"{field} must be {MUST_BE.get(kind, 'something else')}; got {value!r:.80}")
-        raise ParameterError(self._message(Mistake(field, value, kind, text), values))
+            return dict(self._converter.structure(values, self._type))  # type: ignore[call-overload]
+        except ClassValidationError as error:
+            named, others = error.group_exceptions()
+        for wrong, note in named:
+            raise ParameterError(self._message(
+                Mistake(note.name, values.get(note.name), False, f"{note.name}{wrong}"), values)) from None
+        (extra,) = (wrong for wrong in others if isinstance(wrong, ForbiddenExtraKeysError))
+        field = next(name for name in values if name in extra.extra_fields)
+        raise ParameterError(self._message(Mistake(field, values[field], True, ""), values))
+
+
+def _text(value: Any, _: Any) -> str:
+    if not isinstance(value, str) or not value.isprintable():
+        raise ParameterError(f" must be text; got {value!r:.80}")
+    return value
+
+
+def _flag(value: Any, _: Any) -> bool:
+    if not isinstance(value, bool):
+        raise ParameterError(f" must be true or false; got {value!r:.80}")
+    return value
+
+
+def _number(unit: str, finite: bool) -> Callable[[Any, Any], Any]:
+    def read(value: Any, _: Any) -> Any:
+        number = number_in("", value, unit)
+        return require("", number, unit) if finite else number
+
+    return read
+
+
+def _readers(kind: Any) -> list[Callable[[Any], Any]]:
+    """The methods `read` of the marks in an annotation."""
+    return [mark.read for mark in getattr(kind, "__metadata__", ()) if hasattr(mark, "read")]
+
+
+def _marked(kind: Any) -> Callable[[Any, Any], Any]:
+    read = _readers(kind)[0]
+    return lambda value, _: read(value)
