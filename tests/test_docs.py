@@ -216,6 +216,21 @@ def test_defaults_in_the_table_of_options_are_those_of_the_program() -> None:
     assert found > 30
 
 
+def test_defaults_and_switches_in_the_table_of_deviations_are_those_of_the_program() -> None:
+    """Fails if the page on the paper gives a default or a switch that no case has."""
+    parameters = {name: parameter for case in CASES for name, parameter in find_case(case).parameters.items()}
+    found = 0
+    for line in PAGES["docs/leaving_the_paper.md"].splitlines():
+        if line.startswith("| ["):
+            _, _, _, default, switches, *_ = (cell.strip() for cell in line.strip("|").split("|"))
+            for name, value in re.findall(r"`(\w+)` ([\w.-]+)", default):
+                said = {"on": "True"}.get(value, value)
+                assert said == (expected := str(parameters[name].default)) or float(said) == float(expected), name
+                found += 1
+            assert {name.replace("-", "_") for name in re.findall(r"--(?:no-)?([\w-]+)", switches)} <= parameters.keys(), line
+    assert found >= 13
+
+
 def test_numbers_of_the_loading_are_those_of_the_program() -> None:
     """Fails if the page of methods gives other limits of Newton's method than the program has."""
     controls = StaticsControls()
