@@ -16,10 +16,17 @@ from plates import invoke_program, plate
 
 import skfsink
 from skfsink.cli.program import command
+from skfsink.fem.backends import BACKENDS
+from skfsink.fem.elements import ELEMENTS
+from skfsink.fields.sinks import SINKS
+from skfsink.material import MATERIALS
 from skfsink.meshing import sample
 from skfsink.meshing.vtu import write_mesh
 from skfsink.methods.controls import StaticsControls
+from skfsink.methods.integrators import INTEGRATORS
 from skfsink.methods.statics import Statics
+from skfsink.results.history import HISTORY_COLUMNS
+from skfsink.run.observers.history import VALUES
 from skfsink.scene.options import Options
 from skfsink.scene.registry import CASES, find_case
 from skfsink.sweep.vary import read_variation
@@ -49,7 +56,18 @@ def made(name: str) -> ModuleType:
 
 # --- examples ---
 @pytest.fixture
-def place(tmp_path: Path) -> Iterator[Path]:
+def registries() -> Iterator[None]:
+    """What an example enters in a registry is gone after it."""
+    before = [(registry, dict(registry)) for registry in (BACKENDS, ELEMENTS, HISTORY_COLUMNS, INTEGRATORS, MATERIALS,
+                                                          SINKS, VALUES)]
+    yield
+    for registry, content in before:
+        registry.clear()
+        registry.update(content)
+
+
+@pytest.fixture
+def place(registries: None, tmp_path: Path) -> Iterator[Path]:
     """A folder to run examples in, in which the mesh `coarse` of the plate has 79 elements; with the deck of the
     pages."""
     (tmp_path / "cases" / "meshes").mkdir(parents=True)
@@ -84,6 +102,46 @@ if importlib.util.find_spec("gmsh"):
     "def double_edge_notch(": """
 result = double_edge_notch(mesh="coarse", options=Options(length_scale=0.9, event_time=1e-6, quiet=True))
 assert result.summary["case"] == CASE.name
+""",
+    "class Watchful(": """
+from skfsink import Options
+from skfsink.cases.single_edge_notch import single_edge_notch
+runs = {name: single_edge_notch(mesh="coarse", options=Options(
+    length_scale=0.9, event_time=4e-7, gamma_every=8, integrator=name, quiet=True, out=name))
+    for name in ("explicit", "watchful")}
+solves = [run.summary["cost"]["gamma_solves"] for run in runs.values()]
+assert solves[1] > solves[0] and runs["watchful"].summary["integrator"] == "watchful"
+""",
+    "class Weight(": """
+from dataclasses import replace
+from skfsink import read_deck
+from skfsink.fields import Body
+scene = read_deck("plate.toml").scene()
+dead = Body.of(replace(scene, loads=heavy)).loading.dead
+dead.at(2.0)
+assert abs(dead.values[:, 1].sum() + 2e-3 * scene.sample.space.V.sum()) < 1e-9
+""",
+    "class Halfway(": """
+from skfsink import Options
+from skfsink.cases.single_edge_notch import single_edge_notch
+gammas = {name: single_edge_notch(mesh="coarse", options=Options(
+    length_scale=0.9, event_time=4e-7, sink=name, quiet=True, out=name)).state.gamma for name in SINKS}
+assert all(not (gammas["halfway"] == gammas[name]).all() for name in ("lumped", "nearest"))
+""",
+    "def softened_forms(": """
+from skfsink import Options
+from skfsink.cases.single_edge_notch import single_edge_notch
+loads = {name: single_edge_notch(mesh="coarse", options=Options(
+    length_scale=0.9, event_time=2e-7, element=name, kernels="forms", quiet=True, out=name)).summary["onset"]
+    for name in ("plain", "softened")}
+assert loads["softened"]["elastic_energy"] < loads["plain"]["elastic_energy"]
+""",
+    'HISTORY_COLUMNS["greatest_speed_m_per_s"]': """
+from skfsink import Options, load
+from skfsink.cases.single_edge_notch import single_edge_notch
+single_edge_notch(mesh="coarse", options=Options(length_scale=0.9, event_time=4e-7, quiet=True, out="speeds"))
+assert load("speeds").event["greatest_speed_m_per_s"].max() > 0.0
+assert load("speeds").event.units["greatest_speed_m_per_s"] == "m/s"
 """}
 
 
@@ -113,7 +171,7 @@ def test_every_block_runs(page: str, place: Path) -> None:
 def test_there_are_blocks() -> None:
     """Fails if blocks are not found any more, or what comes before or after one belongs to none."""
     assert {page: len(texts) for page, texts in programs().items()}.items() >= {
-        "docs/first_crack.md": 4, "docs/results.md": 1, "CONTRIBUTING.md": 3}.items()
+        "docs/first_crack.md": 4, "docs/results.md": 1, "CONTRIBUTING.md": 8}.items()
     texts = [text for page in programs().values() for text in page]
     assert all(any(words in text for text in texts) for words in (*BEFORE, *AFTER))
 
@@ -227,7 +285,8 @@ def test_defaults_and_switches_in_the_table_of_deviations_are_those_of_the_progr
                 said = {"on": "True"}.get(value, value)
                 assert said == (expected := str(parameters[name].default)) or float(said) == float(expected), name
                 found += 1
-            assert {name.replace("-", "_") for name in re.findall(r"--(?:no-)?([\w-]+)", switches)} <= parameters.keys(), line
+            flags = {name.replace("-", "_") for name in re.findall(r"--(?:no-)?([\w-]+)", switches)}
+            assert flags <= parameters.keys(), line
     assert found >= 13
 
 

@@ -1,3 +1,4 @@
+from .body import Body as Body
 from .crack import CrackTracker as CrackTracker
 from .crack import Tips as Tips
 from .density import Density as Density

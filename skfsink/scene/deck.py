@@ -63,7 +63,7 @@ class Deck:
         return tomli_w.dumps({"case": self.case, **tables_beside(self.parameters)})
 
 
-def read_deck(path: Path) -> Deck:
+def read_deck(path: str | Path) -> Deck:
     """Read a deck.
 
     Raises
@@ -71,6 +71,7 @@ def read_deck(path: Path) -> Deck:
     ParameterError
         One line: the file is no deck, or it has a parameter, a unit or a value that cannot be.
     """
+    path = Path(path)
     try:
         if not path.is_file():
             raise ParameterError(f"there is no deck {path}")
