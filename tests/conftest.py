@@ -11,11 +11,10 @@ from pathlib import Path
 
 import pytest
 from bodies import Fracture, at_onset, box, notched
-from plates import plate
+from plates import drawing, plate
 
 from skfsink.fem.space import Space
 from skfsink.meshing.vtu import write_mesh
-from skfsink.run import compute
 
 
 @pytest.fixture(params=["quad", "hex"])
@@ -43,20 +42,15 @@ def mesh(tmp_path: Path) -> Path:
     return tmp_path / "plate.vtu"
 
 
-DRAWING = {name: getattr(compute, name) for name in ("draw_run", "draw_comparison")}
-
-
 @pytest.fixture(scope="session", autouse=True)
 def no_pictures() -> Iterator[None]:
     """Runs within the process of the tests draw nothing: pictures take longer than runs of small bodies."""
-    with pytest.MonkeyPatch.context() as patch:
-        for name in DRAWING:
-            patch.setattr(compute, name, lambda *_: None)
+    with drawing(False):
         yield
 
 
 @pytest.fixture
-def pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+def pictures() -> Iterator[None]:
     """Runs draw their pictures in this test."""
-    for name, draw in DRAWING.items():
-        monkeypatch.setattr(compute, name, draw)
+    with drawing(True):
+        yield

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+import pytest
 
 from skfsink.fields.body import Body
+from skfsink.fields.energy import Ledger
 from skfsink.fields.momentum import Momentum
 from skfsink.fields.state import State
+from skfsink.results.frame import Frame, frame_file, read_frame
+from skfsink.results.series import frame_times
 
 
 class Moment(NamedTuple):
@@ -43,7 +48,7 @@ class Energies:
         """The balance whose materials and regions these are."""
         return self.body.momentum
 
-    def density(self, state: State) -> np.ndarray:
+    def density(self, state: State | Frame) -> np.ndarray:
         """Gauss point densities of a state, zero in deleted elements and below the force floor, (ne, nq)."""
         gamma = np.einsum("qa,ea->eq", self.body.space.N, state.gamma[self.body.space.conn])
         gamma[(gamma < self.momentum.force_floor) | state.deleted[:, None]] = 0.0
@@ -62,8 +67,8 @@ class Energies:
             W[here] = part.material.energy(F[here], J_bar[here])
         return W
 
-    def of(self, state: State) -> Moment:
-        """The moment of a state."""
+    def of(self, state: State | Frame) -> Moment:
+        """The moment of a state, or of a frame that has been stored."""
         gamma = self.density(state)
         mass = self.body.space.lump(gamma * self.momentum.rho0)
         return Moment(state.time, gamma, self.stored(state.u, gamma), mass, 0.5 * (state.v**2).sum(axis=1))
@@ -87,6 +92,31 @@ class Energies:
             stored += float((w * (one.gamma - two.gamma) * _mean(one.gamma, one.W, two.gamma, two.W)).sum())
             kinetic += float(((one.mass - two.mass) * _mean(one.mass, one.half_v2, two.mass, two.half_v2)).sum())
         return stored, kinetic
+
+
+def stored_moments(body: Body, folder: Path) -> list[Moment]:
+    """Those of the frames that a run has left in its folder."""
+    series = folder / "series"
+    return [Energies(body).of(read_frame(series / frame_file("run", number), time, "", body.space.dim))
+            for number, time in enumerate(frame_times(series / "run.pvd"))]
+
+
+def thinned(moments: Sequence[Moment], every: int) -> list[Moment]:
+    """Each `every`-th one, and the last one."""
+    return [*moments[:-1:every], moments[-1]]
+
+
+def check_sink(body: Body, ledger: Ledger, moments: Sequence[Moment], every: int = 1) -> None:
+    """Hold D of a ledger, in both parts, against each `every`-th moment of an event.
+
+    Half as many tell the error of these.
+    """
+    energies, initial = Energies(body), ledger.initial
+    fine, coarse = (energies.taken(thinned(moments, steps)) for steps in (every, 2 * every))
+    for booked, near, far in zip((ledger.sink_stored, ledger.sink_kinetic), fine, coarse, strict=True):
+        assert near > 0.1 * initial
+        assert abs(near - far) < 0.01 * initial
+        assert booked == pytest.approx(near, abs=1.5 * abs(near - far) + 1e-3 * initial)
 
 
 def _mean(m0: np.ndarray, q0: np.ndarray, m1: np.ndarray, q1: np.ndarray) -> np.ndarray:

@@ -8,21 +8,24 @@ import json
 import os
 import signal
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import meshio
 import numpy as np
+import pytest
 
 from skfsink.__main__ import main
 from skfsink.cases.single_edge_notch import single_edge_notch
 from skfsink.cli.program import command
 from skfsink.meshing.sample import Sample, file_sample
 from skfsink.meshing.vtu import write_mesh
+from skfsink.run import compute
 
 os.environ["SKFSINK_DEBUG"] = "1"  # what should not happen is a traceback then
+DRAW = {name: getattr(compute, name) for name in ("draw_run", "draw_comparison")}
 SMALL = ["--length-scale", "0.6", "--hht-dt", "5e-7", "--quiet"]  # for the elements of 0.3 mm of `plate()`
 
 
@@ -122,6 +125,15 @@ def forked(arguments: Sequence[object], stop: int = 0, number: signal.Signals = 
     with os.fdopen(read, "rb") as pipe:
         text = pipe.read().decode()
     return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), text
+
+
+@contextlib.contextmanager
+def drawing(draws: bool) -> Iterator[None]:
+    """Whether runs within this process draw their pictures."""
+    with pytest.MonkeyPatch.context() as patch:
+        for name, draw in DRAW.items():
+            patch.setattr(compute, name, draw if draws else lambda *_: None)
+        yield
 
 
 def contents(folder: Path) -> dict[str, bytes]:

@@ -42,13 +42,14 @@ def middles(result: Result) -> np.ndarray:
     return middle
 
 
-def test_comes_apart_with_a_closed_ledger(both: Result) -> None:
-    """Fails if the crack stops on its way, or if a loss is left out of the ledger or booked twice."""
-    for summary in summaries(both):
-        assert summary["event"]["separated"]
-        assert summary["energy"]["balance_error_relative"] < 0.01
-    dynamic = summaries(both)[0]
-    assert abs(dynamic["energy"]["numerical"]) < 0.02 * dynamic["energy"]["initial"]
+def test_comes_apart_without_a_loss_of_the_scheme(both: Result) -> None:
+    """Fails if the crack stops on its way, the scheme dissipates by itself, or the passes book as released what the
+    sink took: of each about a half (D of all samples 0.45 to 0.58 of the initial energy)."""
+    dynamic, quasistatic = summaries(both)
+    assert dynamic["event"]["separated"] and quasistatic["event"]["separated"]
+    initial = quasistatic["energy"]["initial"]
+    assert abs(dynamic["energy"]["numerical"]) < 0.02 * initial
+    assert 0.4 * initial < quasistatic["energy"]["D_sink_final"] < 0.65 * initial
 
 
 def test_dynamic_crack_dissipates_more(both: Result) -> None:

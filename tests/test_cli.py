@@ -205,6 +205,7 @@ def check_files(folder: Path, summary: dict[str, object]) -> None:
     assert not list(folder.rglob(".*"))
 
 
+@pytest.mark.slow
 def test_files_of_both_analyses(mesh: Path, tmp_path: Path, pictures: None) -> None:
     """Fails if a file is missing, a key of schema 3 is, or a separated plate is not reported as such."""
     out = tmp_path / "a [b] c"  # a name that is markup to rich

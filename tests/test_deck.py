@@ -259,6 +259,7 @@ def test_ten_thousand_variants(tmp_path: Path, content: bytes, place: int, case:
 
 
 # --- the program ---
+@pytest.mark.slow
 def test_run_and_resume_from_a_deck(tmp_path: Path) -> None:
     """Fails if the program does not run a deck, or its results differ from those of the case's own command line."""
     write_mesh(tmp_path / "plate.vtu", plate())

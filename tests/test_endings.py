@@ -71,6 +71,7 @@ IMPLICIT = st.builds(HHTControls, alpha=st.sampled_from([0.0, -1 / 3]), dt=st.sa
 LAWS = st.builds(SinkLaw, m=st.sampled_from([1.0, 10.0, 80.0]), length_scale=st.sampled_from([0.01, 0.1, 2.0]))
 
 
+@pytest.mark.slow
 @EXAMPLES
 @given(controls=st.fixed_dictionaries(OPTIONS), explicit=EXPLICIT, hht=IMPLICIT, law=LAWS,
        k=st.sampled_from([5.0, 500.0, 1e5]))
@@ -82,6 +83,7 @@ def test_absurd_options(tmp_path: Path, controls: dict[str, Any], explicit: Expl
     ends_well(dataclasses.replace(of, controls=asked), SMALL.onset, tmp_path / "run")
 
 
+@pytest.mark.slow
 @EXAMPLES
 @given(seed=st.integers(0, 10**6), size=st.sampled_from([1e-3, 0.05, 0.5, 3.0]), decades=st.sampled_from([0, 1, 15]),
        integrator=st.sampled_from(["explicit", "hht"]), coupling=st.sampled_from(["iterated", "single"]))

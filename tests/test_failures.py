@@ -30,6 +30,7 @@ def test_explicit_blow_up_is_as_predicted(state: str):
         ExplicitControls(courant=1.001)
 
 
+@pytest.mark.slow
 def test_hht_without_its_guard_kills_the_mesh_in_long_steps():
     """Fails if the guard does nothing, or is not needed any more: 10 us steps against 0.2 us."""
     short, guarded, bare = (stability_time.long_steps(dt, guard) for dt, guard in ((0.2, True), (10.0, True),
@@ -107,6 +108,7 @@ def test_pressed_elements_are_refused_before_they_turn_inside_out():
     assert inverted(space, u, np.zeros(space.w.shape)) == (0, 0.0)
 
 
+@pytest.mark.slow
 def test_energy_deleted_grows_with_the_threshold():
     """Fails if the allowed thresholds delete energy that matters, or the floor does not make it vanish."""
     most, highest, default = (stability_time.deletion(t, f, 15.0) for t, f in ((0.5, 0.0), (1e-2, 0.0), (1e-6, 1e-3)))
@@ -126,6 +128,7 @@ def test_history_of_states_that_are_no_equilibria_fails_the_body():
         StaticsControls(tolerance=0.02)
 
 
+@pytest.mark.slow
 def test_onset_of_a_slit_falls_with_the_mesh_faster_than_that_of_a_round_notch():
     """Fails if a sharp notch is not seen for what it is: its onset is that of the mesh."""
     slit, blunt = ([stability_onset.notch(n, width)["opening_mm"] for n in (20, 40)] for width in (0.0, 0.2))

@@ -59,6 +59,7 @@ def nowhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 # --- drawing ---
+@pytest.mark.slow
 @pytest.mark.parametrize("name", runs.FIGURES)
 def test_every_figure_is_drawn_from_references(name: str, home: Path, tmp_path: Path,
                                                monkeypatch: pytest.MonkeyPatch) -> None:
@@ -140,6 +141,7 @@ def test_redraw_leaves_out_what_has_no_reference(nowhere: Path, capsys: pytest.C
         redraw.select(("fig99",))
 
 
+@pytest.mark.slow
 def test_redraw_draws_what_there_is(home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(layout, "DPI", DPI)
     assert redraw.main(only=("table1",), out=tmp_path) == 0
@@ -148,6 +150,7 @@ def test_redraw_draws_what_there_is(home: Path, tmp_path: Path, monkeypatch: pyt
     assert redraw.select(("simple_shear",)) == ["fig05_simple_shear", "fig11_quasistatic", "energies"]
 
 
+@pytest.mark.slow
 def test_a_script_by_itself_says_what_it_does() -> None:
     for script in ("redraw.py", "spread.py", "table1.py"):
         done = subprocess.run([sys.executable, str(FIGURES / script), "--help"], capture_output=True, text=True,

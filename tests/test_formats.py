@@ -375,6 +375,7 @@ def hostile() -> dict[str, tuple[str, bytes]]:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", hostile())
 def test_broken_files_of_other_programs(name: str, tmp_path: Path) -> None:
     """Fails if a changed file gives a traceback, hangs, or is refused with the text of a library."""

@@ -44,6 +44,7 @@ def test_twins_in_vtu(path: Path, tmp_path: Path) -> None:
     assert same(file_sample(path), file_sample(tmp_path / path.with_suffix(".vtu").name))
 
 
+@pytest.mark.slow
 def test_runs_on_twins(tmp_path: Path) -> None:
     """Fails if runs on a file of gmsh and on the VTU file of the same mesh differ in a byte."""
     histories = []

@@ -156,6 +156,7 @@ def test_a_start_from_rest_goes_on_where_it_was_stopped(tmp_path: Path) -> None:
     assert files[0] == files[1]
 
 
+@pytest.mark.slow
 def test_a_start_from_rest_comes_to_the_static_onset_in_motion(tmp_path: Path) -> None:
     """Fails if the loading from rest stops early, lets the body crack on its way, or hands over a body at rest.
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from bodies import Weight, box, ends, notched, wavy
+from energies import Energies
 from guarded import NOTCHED, PLAIN, Stop, simulation
 
 from skfsink.errors import ConvergenceError, Interrupted, MeshError, ParameterError
@@ -267,16 +268,18 @@ def test_plate_torn_by_a_traction_closes_its_ledger(integrator: str) -> None:
     scheme: Explicit | HHT = (Explicit(body.body) if integrator == "explicit"
                               else HHT(body.body, HHTControls(dt=4e-7, **FINE)))
     scheme.begin(state)
-    scale = state.ledger.elastic
+    scale, energies = state.ledger.elastic, Energies(body.body)
     assert state.ledger.initial == pytest.approx(scale + state.ledger.loads + state.ledger.kinetic)
-    times = []
+    times, moments = [], [energies.of(state)]
     for _ in scheme.run(state, 2.5e-5):
+        moments.append(energies.of(state))
         assert abs(state.ledger.balance) <= allowed * scale
         times.append(state.grip)
         x = state.u[side(body.space, "x+"), 0]
         np.testing.assert_allclose(x, push.value(state.grip), atol=1e-10)
     assert {1.0 + 1e-5, 1.0 + 1.3e-5, 1.0 + 2e-5} <= set(times)
     assert state.deleted.sum() > 3 and state.ledger.sink > 0.1 * scale and state.ledger.loads < 0
+    assert state.ledger.sink == pytest.approx(sum(energies.taken(moments)), rel=0.03)
     assert abs(state.ledger.numerical) < (0.05 if integrator == "explicit" else 0.2) * scale  # HHT damps the jumps
 
 

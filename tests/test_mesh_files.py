@@ -323,6 +323,7 @@ def _compressed_bomb(path: Path) -> None:
     path.write_bytes(content)
 
 
+@pytest.mark.slow
 def test_a_compressed_bomb(tmp_path: Path) -> None:
     """Fails if a small file can fill the memory."""
     _compressed_bomb(tmp_path / "bomb.vtu")

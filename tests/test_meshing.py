@@ -179,6 +179,7 @@ def test_wrong_parameters_are_named(wrong):
         shapes.single_edge_notch_mesh(**wrong)
 
 
+@pytest.mark.slow
 def test_committed_coarse_mesh_can_be_made_again(tmp_path):
     pytest.importorskip("gmsh")
     shapes.main(["single_edge_notch", "--mesh", "coarse", "--output", str(tmp_path)])
@@ -188,6 +189,7 @@ def test_committed_coarse_mesh_can_be_made_again(tmp_path):
     assert set(mesh.cell_data) == set(read("coarse").cell_data)
 
 
+@pytest.mark.slow
 def test_seeds_choose_meshes(monkeypatch):
     pytest.importorskip("gmsh")
     monkeypatch.setattr(meshing, "ATTEMPTS", 2)  # for speed

@@ -20,6 +20,7 @@ def cells(kind: str) -> list[dict[str, Any]]:
     return [cell for cell in json.loads(NOTEBOOK.read_text(encoding="utf-8"))["cells"] if cell["cell_type"] == kind]
 
 
+@pytest.mark.slow
 def test_the_notebook_runs_from_mesh_to_figure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if a cell does not run any more, prints other lines than it shows, or no figure comes out."""
     monkeypatch.chdir(tmp_path)

@@ -23,6 +23,7 @@ QUICK = [*SMALL, "--event-time", "1e-6"]
 system_locks = pytest.mark.skipif(os.name != "nt" and not filelock.has_fcntl, reason="the system locks no files")
 
 
+@pytest.mark.slow
 @system_locks
 def test_a_second_run_is_refused_while_the_first_one_goes_on(mesh: Path, tmp_path: Path) -> None:
     """Fails if two runs write to one folder, if the line does not say whose it is, or a killed run keeps its folder."""

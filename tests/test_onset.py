@@ -347,6 +347,7 @@ x = [["0 s", 0], ["3 s", "0.1 mm"], ["4 s", 0]]
     assert loading["greatest_load"] == pytest.approx(-1.131 * 0.5, rel=2e-3)
 
 
+@pytest.mark.slow
 def test_both_analyses_report_the_same_strength(tmp_path: Path) -> None:
     """Fails if the analysis that starts from the other's onset takes the load there for the greatest of the way."""
     both = run(tmp_path, (10, 2), (5.0, 1.0), 0.5, '"1e-3 mm/s"', "both", event_time="1e-6 s")
@@ -364,6 +365,7 @@ def test_a_body_that_only_softens_is_said_to(tmp_path: Path) -> None:
     assert re.search(r"nothing failed: .* near 1; the body has softened to gamma = 0\.9\d+; the", summary["verdict"])
 
 
+@pytest.mark.slow
 def test_runs_that_did_not_fail_are_compared(tmp_path: Path) -> None:
     """Fails if a report needs the energies of an event of each of its runs."""
     run(tmp_path, (2, 1), (1.0, 0.5), 0.5, '[["0 s", 0], ["1 s", "0.05 mm"]]', "both")

@@ -264,6 +264,7 @@ def test_thin_slab_of_solid_elements():
 
 
 # --- time steps ---
+@pytest.mark.slow
 def test_highest_frequency_and_its_indicator():
     """Fails if the indicator is not the greatest quotient of one element, exceeds the frequency, or is far below it.
 

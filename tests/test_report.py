@@ -15,7 +15,7 @@ from typing import Any
 import meshio
 import numpy as np
 import pytest
-from plates import SMALL, invoke, plate
+from plates import SMALL, drawing, invoke, plate
 
 import skfsink
 from skfsink.cli.program import command
@@ -38,8 +38,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A finished run of the small plate, dynamic and quasi-static. Tests do not change it."""
     root = tmp_path_factory.mktemp("report")
     write_mesh(root / "plate.vtu", plate())
-    status, err, _ = invoke("--mesh", root / "plate.vtu", "--out", root / "both", "--analysis", "both",
-                            "--frame-every", "2e-5", *SMALL)
+    with drawing(True):
+        status, err, _ = invoke("--mesh", root / "plate.vtu", "--out", root / "both", "--analysis", "both",
+                                "--frame-every", "2e-5", *SMALL)
     assert (status, err) == (0, "")
     return root / "both"
 
@@ -389,6 +390,7 @@ def seen(browser: Any, path: Path, width: int) -> dict[str, Any]:
     return found | {"said": said}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", [1280, 360])
 def test_a_browser_shows_the_report(folder: Path, browser: Any, tmp_path: Path, width: int) -> None:
     """Fails if a picture does not appear, the page asks for anything else or complains, or it is wider than the
@@ -402,6 +404,7 @@ def test_a_browser_shows_the_report(folder: Path, browser: Any, tmp_path: Path, 
     assert found["font"] == "700"  # the style is let in by the page's own policy
 
 
+@pytest.mark.slow
 def test_the_browser_would_see_a_broken_page(folder: Path, browser: Any, tmp_path: Path) -> None:
     """Fails if the checks above pass a page with a damaged picture, a script, or a picture from elsewhere."""
     text = report_page([skfsink.load(folder / "dynamic")])

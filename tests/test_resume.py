@@ -44,13 +44,8 @@ def check_readable(folder: Path) -> None:
 
 
 # --- the same twice, and the same after kills ---
-def some_slow(fast: list[object], slow: list[object]) -> list[object]:
-    """Parameters of a test, those of the second list marked as slow."""
-    return [*fast, *(pytest.param(*(p if isinstance(p, tuple) else (p,)), marks=pytest.mark.slow) for p in slow)]
-
-
-@pytest.mark.parametrize("kind, seed", some_slow([("short", 0), ("quasistatic", 0), ("both", 0)],
-                                                 [(kind, 1) for kind in RUNS]))
+@pytest.mark.slow
+@pytest.mark.parametrize("kind, seed", [("short", 0), ("quasistatic", 0), ("both", 0), *((kind, 1) for kind in RUNS)])
 def test_killed_runs_end_the_same(kind: str, seed: int, mesh: Path, tmp_path: Path) -> None:
     """Fails if anything a step depends on is not in the checkpoint, or a file is at any moment a part of itself.
 
@@ -74,11 +69,11 @@ def test_killed_runs_end_the_same(kind: str, seed: int, mesh: Path, tmp_path: Pa
     assert histories(out) == histories(tmp_path / "one") and figures(out) == figures(tmp_path / "one")
 
 
-@pytest.mark.parametrize("kind, number", some_slow(
-    [("short", signal.SIGINT), ("both", signal.SIGTERM)],
-    [("both", signal.SIGINT), ("hht", signal.SIGTERM), ("quasistatic", signal.SIGINT)]))
-def test_interrupted_runs_say_how_to_go_on(kind: str, number: signal.Signals, mesh: Path, tmp_path: Path,
-                                           plain: None) -> None:
+@pytest.mark.slow
+@pytest.mark.parametrize("kind, number", [
+    ("short", signal.SIGINT), ("both", signal.SIGTERM), ("both", signal.SIGINT), ("hht", signal.SIGTERM),
+    ("quasistatic", signal.SIGINT)])
+def test_interrupted_runs_say_how_to_go_on(kind: str, number: signal.Signals, mesh: Path, tmp_path: Path) -> None:
     """Fails if a signal is lost, ends a run without a checkpoint, or if the line names the wrong folder."""
     out = tmp_path / "my runs" / "out"
     arguments = ["--mesh", mesh, "--checkpoint-every", "0.02", *SMALL, *RUNS[kind]]

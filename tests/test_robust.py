@@ -33,6 +33,7 @@ REFERENCES = sorted((Path(__file__).resolve().parents[1] / "cases").glob("*/refe
 
 
 # --- memory ---
+@pytest.mark.slow
 def test_estimate_meets_the_peaks_of_the_references() -> None:
     """Fails if the estimate is off by more than a factor of 1.5 from what a committed run took."""
     estimates: dict[tuple[str, int], float] = {}
@@ -89,6 +90,7 @@ def test_a_large_run_says_what_it_needs(mesh: Path, tmp_path: Path, monkeypatch:
 
 
 # --- signals ---
+@pytest.mark.slow
 def test_a_long_step_is_not_waited_for(mesh: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if a signal in a step that goes on for long ends the run late, with a traceback, or with nothing to resume.
 
@@ -117,6 +119,7 @@ def test_a_long_step_is_not_waited_for(mesh: Path, tmp_path: Path, monkeypatch: 
     assert (out / "history.csv").read_bytes() == (tmp_path / "whole/history.csv").read_bytes()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("place", ["lay_out", "between"])
 def test_signals_outside_of_the_steps(place: str, mesh: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if a signal while a run is set up, or between two analyses, is a traceback or loses the first of them."""
@@ -143,7 +146,8 @@ def test_signals_outside_of_the_steps(place: str, mesh: Path, tmp_path: Path, mo
     assert (out / "quasistatic/summary.json").is_file()
 
 
-@pytest.mark.parametrize("number", [pytest.param(signal.SIGINT, marks=pytest.mark.slow), signal.SIGTERM])
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_programs_that_are_stopped(number: signal.Signals, mesh: Path, tmp_path: Path) -> None:
     """Fails if `skfsink run` or `skfsink sweep` do not end within seconds of a signal, with what goes on with them."""
     deck = tmp_path / "deck.toml"
@@ -188,6 +192,7 @@ def tight(operation: Any, after: int, number: int) -> Any:
     return wrapper
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [errno.ENOSPC, errno.EROFS])
 @pytest.mark.parametrize("after", [9, 25])
 def test_writing_fails(number: int, after: int, mesh: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -218,6 +223,7 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
         subprocess.run(["umount", "-l", str(path)], check=True)
 
 
+@pytest.mark.slow
 def test_a_disk_that_is_full(small_disk: Path, mesh: Path, tmp_path: Path) -> None:
     """Fails if a real disk without room is a traceback, or costs the last checkpoint."""
     out = small_disk / "out"
@@ -231,6 +237,7 @@ def test_a_disk_that_is_full(small_disk: Path, mesh: Path, tmp_path: Path) -> No
     assert (tmp_path / "larger/history.csv").read_bytes() == (tmp_path / "whole/history.csv").read_bytes()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("away", ["series", "."])
 def test_folders_that_vanish(away: str, mesh: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if a folder that is moved away in a run is a traceback, is made again, or what was in it is lost."""

@@ -166,6 +166,7 @@ def test_unknown_mesh_names_the_known_ones() -> None:
         load_sample("dog_bone", "M3")
 
 
+@pytest.mark.slow
 def test_changed_dimension_makes_a_mesh() -> None:
     """Fails if a changed dimension is ignored: the dog-bone's gauge is then 2 mm wide."""
     pytest.importorskip("gmsh")

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from energies import check_sink, stored_moments
 
 from skfsink.cases.single_edge_notch import single_edge_notch
+from skfsink.fields.body import Body
 from skfsink.results.result import Result
 from skfsink.scene.options import Options
 
@@ -15,14 +17,15 @@ ELEMENT = 0.1 / 1.5  # of the coarse mesh [mm]
 @pytest.fixture(scope="module")
 def both(tmp_path_factory: pytest.TempPathFactory) -> Result:
     """Dynamic (explicit) and quasi-static run on the coarse mesh, from one onset."""
-    options = Options(analysis="both", out=tmp_path_factory.mktemp("runs") / "both", quiet=True)
+    options = Options(analysis="both", frame_every=5e-7, out=tmp_path_factory.mktemp("runs") / "both", quiet=True)
     return single_edge_notch(mesh="coarse", options=options)
 
 
 @pytest.fixture(scope="module")
 def hht(tmp_path_factory: pytest.TempPathFactory) -> Result:
     """The first 52 microseconds by HHT, before the crack grows rough enough to branch."""
-    options = Options(integrator="hht", event_time=5.2e-5, out=tmp_path_factory.mktemp("runs") / "hht", quiet=True)
+    options = Options(integrator="hht", event_time=5.2e-5, frame_every=5e-7, quiet=True,
+                      out=tmp_path_factory.mktemp("runs") / "hht")
     return single_edge_notch(mesh="coarse", options=options)
 
 
@@ -33,12 +36,12 @@ def event(result: Result) -> dict[str, np.ndarray]:
 
 
 @pytest.mark.slow
-def test_ledger_closes(both: Result, hht: Result) -> None:
-    """Fails if any loss is left out of the ledger or booked twice: the balance would drift with the crack."""
-    for result in (*both.parts.values(), hht):
-        assert result.summary["energy"]["balance_error_relative"] < 0.01
-    assert abs(both.parts["dynamic"].summary["energy"]["numerical"]) < 0.02 * both.parts["dynamic"].summary["onset"][
-        "elastic_energy"]
+def test_D_is_the_integral_over_the_frames(both: Result, hht: Result) -> None:
+    """Fails if D is not what the fields of the frames give, or a scheme dissipates by itself."""
+    for result in (both.parts["dynamic"], hht):
+        ledger = result.state.ledger
+        check_sink(Body.of(result.scene), ledger, stored_moments(Body.of(result.scene), result.folder))
+        assert abs(ledger.numerical) < 0.02 * ledger.initial
 
 
 @pytest.mark.slow
@@ -57,11 +60,11 @@ def test_dynamic_dissipates_more_and_quasistatic_runs_straight(both: Result) -> 
 
 @pytest.mark.slow
 def test_released_energy_is_what_a_dynamic_crack_turns_into_motion(both: Result) -> None:
-    """Fails if `released` is not the drop of stored energy at fixed gamma."""
-    energy = both.parts["quasistatic"].summary["energy"]
-    total = energy["initial"] + both.parts["quasistatic"].history["work"][-1]
-    assert energy["released"] > 0.2 * energy["initial"]
-    assert energy["released"] + energy["D_sink_final"] + energy["elastic_final"] == pytest.approx(total, rel=1e-3)
+    """Fails if `released` is far from what a dynamic crack sets in motion: its kinetic energy, and that which the sink
+    has taken. What is released is exact in test_energies.py."""
+    moved, still = (both.parts[name].summary["energy"] for name in ("dynamic", "quasistatic"))
+    motion = moved["kinetic_final"] + moved["D_sink_kinetic"] + moved["numerical"]
+    assert still["released"] == pytest.approx(motion, rel=0.25)
 
 
 @pytest.mark.slow
@@ -95,5 +98,4 @@ def test_M3_branches(tmp_path_factory: pytest.TempPathFactory) -> None:
     result = single_edge_notch(options=Options(out=tmp_path_factory.mktemp("runs") / "M3", quiet=True))
     summary = result.summary
     assert summary["event"]["max_branches"] >= 2
-    assert summary["energy"]["balance_error_relative"] < 0.01
     assert summary["energy"]["U_paper_at_arrival"] == pytest.approx(0.067, rel=0.3)

@@ -48,6 +48,7 @@ def start(cache: Path) -> tuple[int, list[str]]:
     return int(missed), names
 
 
+@pytest.mark.slow
 def test_a_start_compiles_what_it_needs_and_a_second_one_nothing(tmp_path: Path) -> None:
     """Fails if a loop cannot be cached, as one that closes over other compiled functions, or a plate compiles 3D loops.
 
@@ -77,6 +78,7 @@ def copied(folder: Path) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_a_change_in_an_imported_module_is_seen(tmp_path: Path) -> None:
     """Fails if a loop is read from the cache although what was built into it has changed in another file.
 
@@ -137,6 +139,7 @@ print(isotropic._neo_hookean_law.stats.cache_path, sum(isotropic._neo_hookean_la
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("home", ["read-only", "none", "writable"])
 def test_a_read_only_install_keeps_its_loops_in_a_temporary_folder(home: str, tmp_path: Path) -> None:
     """Fails if the program does not start where neither it nor the home folder can be written, or says so not once.

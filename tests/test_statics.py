@@ -168,8 +168,11 @@ def test_loading_resumes_to_the_same_bits():
 
 
 @pytest.mark.parametrize("n", [9, 15])
-def test_quasi_static_crack_runs_straight_and_the_ledger_closes(n: int):
-    """Fails if a pass loses energy: released + D make up what was stored, and the crack cuts the plate."""
+def test_quasi_static_crack_runs_straight(n: int):
+    """Fails if gamma grows, the stored energy grows, or the crack does not cut the plate straight.
+
+    The balance holds by construction; what is released, and D, are held against the fields in test_energies.py.
+    """
     body = loaded(n)
     state, statics, space = body.state, body.statics, body.statics.space
     state.begin_event(0.005)
@@ -177,7 +180,6 @@ def test_quasi_static_crack_runs_straight_and_the_ledger_closes(n: int):
     gamma, elastic = state.gamma, np.inf
     for _ in statics.propagate(state):
         ledger = state.ledger
-        assert abs(ledger.balance) <= 1e-12 * ledger.initial
         assert (state.gamma <= gamma + 1e-7).all()
         assert ledger.elastic < elastic + 1e-12 and ledger.released >= 0
         gamma, elastic = state.gamma, ledger.elastic
@@ -186,7 +188,6 @@ def test_quasi_static_crack_runs_straight_and_the_ledger_closes(n: int):
         assert state.step < 40
     assert ledger.work == 0.0  # the grips stood still
     assert abs(ledger.elastic) < 1e-9 * ledger.initial
-    assert ledger.sink + ledger.deletion + ledger.released == pytest.approx(ledger.initial, rel=1e-9)
     assert 0.2 * ledger.initial < ledger.released < 0.6 * ledger.initial
     centres = space.X[space.conn[state.deleted]].mean(axis=1)
     assert np.abs(centres[:, 1] - 0.5).max() < 1.1 / n and centres[:, 0].max() > 0.9

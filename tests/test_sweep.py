@@ -91,6 +91,7 @@ def table(out: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
+@pytest.mark.slow
 def test_every_combination_once_a_table_and_a_picture(deck: Path, tmp_path: Path) -> None:
     """Fails if a run is missing or made twice, if one that fails stops the others, or is not named in the table."""
     out = tmp_path / "sweep"
@@ -171,6 +172,7 @@ def test_units_are_those_of_the_bodies(tmp_path: Path) -> None:
         assert [row["onset_load"] for row in rows] == [7.0] * len(some)
 
 
+@pytest.mark.slow
 def test_two_processes_in_one_folder(deck: Path, tmp_path: Path) -> None:
     """Fails if a run is made twice when two processes are given it at once."""
     folder = tmp_path / "one"
