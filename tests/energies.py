@@ -70,7 +70,10 @@ class Energies:
     def of(self, state: State | Frame) -> Moment:
         """The moment of a state, or of a frame that has been stored."""
         gamma = self.density(state)
-        mass = self.body.space.lump(gamma * self.momentum.rho0)
+        rho0 = np.zeros_like(gamma)
+        for part in self.momentum.parts:
+            rho0[slice(None) if part.elements is None else part.elements] = part.material.rho0
+        mass = self.body.space.lump(gamma * rho0)
         return Moment(state.time, gamma, self.stored(state.u, gamma), mass, 0.5 * (state.v**2).sum(axis=1))
 
     def elastic(self, moment: Moment) -> float:
