@@ -332,6 +332,7 @@ def test_a_compressed_bomb(tmp_path: Path) -> None:
     assert isinstance(line, str) and "unpacks to 5.37e+03 MB, the most is 500 MB" in line, line
 
 
+@pytest.mark.slow
 def test_a_bomb_of_arrays(tmp_path: Path) -> None:
     """Fails if a small archive of arrays, as runs keep their meshes in, can fill the memory."""
     with zipfile.ZipFile(tmp_path / "bomb.npz", "w", zipfile.ZIP_DEFLATED) as archive:

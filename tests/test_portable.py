@@ -8,6 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 from plates import SMALL, plate
 
 from skfsink.meshing.vtu import write_mesh
@@ -64,6 +65,7 @@ def test_every_module_imports() -> None:
     assert len(started(HIDE + EVERY).split()) > 200
 
 
+@pytest.mark.slow
 def test_a_run_is_the_same(tmp_path: Path) -> None:
     """Fails if a run does not end there, has other results or other files, or says no memory that it took."""
     write_mesh(tmp_path / "plate.vtu", plate())

@@ -391,7 +391,7 @@ def two_materials(**controls: object) -> Scene:
         Region("upper", where(space, 1, 0.6), STIFF, STRONGER),))
 
 
-@pytest.mark.parametrize("integrator", ["explicit", "hht"])
+@pytest.mark.parametrize("integrator", ["explicit", pytest.param("hht", marks=pytest.mark.slow)])
 def test_a_resumed_run_ends_with_the_same_bytes(integrator: str, tmp_path: Path) -> None:
     """Fails if a region is not in the fingerprint, or a step depends on what a checkpoint of several parts lacks.
 
