@@ -16,8 +16,8 @@ from .pictures.film import still as still
 from .report.page import write_report as write_report
 from .results.loader import load as load
 from .results.result import Result as Result
-from .scene.deck import read_deck as read_deck
 from .run.observers.observer import Observer as Observer
+from .scene.deck import read_deck as read_deck
 from .scene.options import Options as Options
 from .system.shipped import data_folder as data_folder
 from .system.version import __version__ as __version__
