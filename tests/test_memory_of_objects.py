@@ -1,4 +1,8 @@
-"""What objects remember between calls is in their docstrings: a scan of the package."""
+"""What objects remember between calls is in their docstrings: a scan of the package.
+
+Memory outside of the state is then either written down, or in the `memory` of a method, which checkpoints keep; that a
+body carries none from one run to the next is tested in test_state.py.
+"""
 
 from __future__ import annotations
 
