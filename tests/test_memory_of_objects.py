@@ -1,4 +1,8 @@
-"""What objects remember between calls is in their docstrings: a scan of the package."""
+"""What objects remember between calls is in their docstrings: a scan of the package.
+
+Memory outside of the state is then either written down, or in the `memory` of a method, which checkpoints keep; that a
+body carries none from one run to the next is tested in test_state.py.
+"""
 
 from __future__ import annotations
 
@@ -61,21 +65,40 @@ def _own(node: ast.AST) -> str:
     return node.attr if is_own else ""  # type: ignore[attr-defined]
 
 
-def unsaid(source: str) -> Iterator[str]:
-    """Methods of public classes that depend on earlier calls, and are not named under "Memory:" in the docstring."""
-    for node in ast.walk(ast.parse(source)):
-        if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
-            memory = re.search(r"Memory: (.*?)(\n\n|$)", ast.get_docstring(node) or "", re.DOTALL)
-            said = set(re.findall(r"`(\w+)`", memory[1])) if memory else set()
-            for name in sorted(Methods(node).depending() - said):
-                yield f"{node.name}.{name}"
+def classes(source: str) -> dict[str, ast.ClassDef]:
+    """The classes of a module by name."""
+    return {node.name: node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.ClassDef)}
+
+
+def named(of: str, known: dict[str, ast.ClassDef]) -> set[str]:
+    """Methods under "Memory:" in the docstring of a class, of its bases, and of classes that it refers to there."""
+    if of not in known:
+        return set()
+    memory = re.search(r"Memory: (.*?)(\n\n|$)", ast.get_docstring(known[of]) or "", re.DOTALL)
+    text = memory[1] if memory else ""
+    bases = [base.id for base in known[of].bases if isinstance(base, ast.Name)]
+    return set(re.findall(r"`(\w+)`", text)).union(*(
+        named(other, known) for other in (*bases, *re.findall(r":class:`\.(\w+)`", text)) if other != of))
+
+
+def unsaid(source: str, known: dict[str, ast.ClassDef] | None = None) -> Iterator[str]:
+    """Methods of public classes that depend on earlier calls, and are not named under "Memory:".
+
+    `known` are the classes of other modules.
+    """
+    here = classes(source)
+    for name, node in here.items():
+        if not name.startswith("_"):
+            for method in sorted(Methods(node).depending() - named(name, {**(known or {}), **here})):
+                yield f"{name}.{method}"
 
 
 def test_methods_that_depend_on_earlier_calls_say_so() -> None:
     """Fails if a public method's result hangs on what was called before, and the class does not say so."""
     files = sorted(PACKAGE.rglob("*.py"))
     assert len(files) > 100
-    found = [f"{path.relative_to(PACKAGE)}: {name}" for path in files for name in unsaid(path.read_text())]
+    known = {name: node for path in files for name, node in classes(path.read_text()).items()}
+    found = [f"{path.relative_to(PACKAGE)}: {name}" for path in files for name in unsaid(path.read_text(), known)]
     assert not found, "\n".join(found)
 
 
@@ -103,3 +126,5 @@ class Solver:
     memory = 'Solves.\n\n    Memory: the last one, which `solve` gives again.\n    """'
     said = source.replace('Solves."""', memory)
     assert list(unsaid(said)) == ["Solver.note"]
+    base = classes('class Base:\n    """A base.\n\n    Memory: `note` counts."""')
+    assert list(unsaid(said.replace("class Solver:", "class Solver(Base):"), base)) == []

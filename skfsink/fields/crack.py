@@ -71,8 +71,8 @@ class Plane(NamedTuple):
 class CrackTracker:
     """Follows the crack through the nodal density, one call a record.
 
-    Memory: when each node cracked, the origins and the records so far; `mark`, `look`, `mean_speed` and `memory` tell
-    of the crack up to now. Times must not go back.
+    Memory: when each node cracked, the origins and the records so far; `mark`, `look`, `nothing`, `mean_speed` and
+    `memory` tell of the crack up to now. Times must not go back.
 
     Parameters
     ----------

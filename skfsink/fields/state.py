@@ -21,6 +21,8 @@ class State:
     A field that is added here is copied, kept in a checkpoint and read from it without being named anywhere else: it
     has to be an array, None, or of plain values as JSON has them.
 
+    Memory: it is the memory of a run: `begin_event` changes it, `stored` gives all of it.
+
     Attributes
     ----------
     u, v, a: displacement [mm], velocity [mm/s], acceleration [mm/s^2] of the nodes, (n, dim).

@@ -40,8 +40,8 @@ class HHT:
     """Integrates a :class:`State`; see the module for the scheme.
 
     Memory: step size and the terms of the balances at the last accepted state: after `begin`, `start` or `restore`,
-    `run` and `step` go on with that one state; `memory` gives what a checkpoint needs. An attempt that is given up
-    leaves nothing behind but a shorter step.
+    `run` and `step` go on with that one state, `reaction` is of it; `memory` gives what a checkpoint needs. An attempt
+    that is given up leaves nothing behind but a shorter step.
 
     Parameters
     ----------

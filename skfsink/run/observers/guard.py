@@ -30,8 +30,9 @@ log = logging.getLogger(__name__)
 class Guard(Observer):
     """Watches one run of a scene, against the tolerance `balance_tolerance` of its ledger.
 
-    Memory: evenness and energy at the onset, failed elements at the last step, and how deep faces overlapped: what it
-    says depends on them.
+    Memory: evenness and energy at the onset, failed elements at the last step, and how deep faces overlapped: what
+    `check_onset`, `even`, `check_step`, `check_record`, `check_stress`, `check_overlap` and `check_end` say depends on
+    them.
 
     Parameters
     ----------

@@ -54,7 +54,7 @@ VALUES: dict[str, Callable[[View], Any]] = {
 class History(Observer):
     """Writes `history.csv`: a row for each load increment, at each record of the event, and when the crack arrives.
 
-    Memory: the rows so far.
+    Memory: the `rows` so far.
 
     Parameters
     ----------

@@ -22,7 +22,9 @@ class Observer:
     `finish`; at last `close`, however the run has ended. A run that ends without a failure has no event: `unfailed`
     takes its place.
 
-    Memory: that of its class; `kept` names the attributes of which a checkpoint needs the values.
+    Memory: that of its class, which the hooks `open`, `prepare`, `loading`, `onset`, `unfailed`, `begin`, `due`,
+    `look`, `pause`, `finish` and `close` build up in the order above; `kept` names the attributes of which a
+    checkpoint needs the values, `memory` gives them.
 
     Attributes
     ----------

@@ -24,7 +24,8 @@ __all__ = ["View"]
 class View:
     """A run at a moment: the scene, the state, and what follows from them. Observers change nothing in it.
 
-    Memory: all of it: the run moves it on with :meth:`at`.
+    Memory: all of it: the run moves it on with `at`, and `load`, `displacement`, `stress`, `stress_is_known`,
+    `step_share` and `due` are of the moment it is at.
 
     Attributes
     ----------
