@@ -250,7 +250,7 @@ def test_a_third_material_is_one_class(space: Space):
     tiles = Tiles(space)
     tiles.set_gamma(gamma)
     force = np.empty_like(u)
-    tiles.force(space.X + u, [Law(material.law, material.constants, material.bulk_modulus)], force)
+    tiles.force(space.X + u, [Law(material.compiled_law, material.constants, material.bulk_modulus)], force)
     basis, forms = space.u_basis, momentum_forms(material)
     fields = {"displacement": u.ravel(), "gamma": gamma, "dV": basis.dx}
     expected = forms.residual.assemble(basis, **fields)

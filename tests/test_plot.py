@@ -236,7 +236,7 @@ def test_tip_picture(tmp_path: Path) -> None:
 
 def test_comparison_picture(plate: Space, tmp_path: Path) -> None:
     comparison_picture(plate, cracked(plate, 3.5), cracked(plate, 2.5, time=np.nan), history(),
-                       history(quasistatic=True), tmp_path / "comparison.png", "a title")
+                       history(quasistatic=True), tmp_path / "comparison.png", title="a title")
     picture = pixels(tmp_path / "comparison.png")
     assert picture.shape[1] == plot.WIDTH * DPI and picture.std() > 10
 

@@ -124,7 +124,7 @@ def test_speed_is_in_its_colours(block: Space) -> None:
     pytest.importorskip("pyvista")
     body = surface(block, frame(block, 1.0))
     np.testing.assert_allclose(np.asarray(body["speed"]), 5e3, rtol=1e-6)
-    picture = render(block, frame(block), FRONT, box(block), WIDTH, "speed", 1e4)
+    picture = render(block, frame(block), FRONT, box(block), WIDTH, field="speed", largest=1e4)
     middle = picture[picture.shape[0] // 2, WIDTH // 4].astype(float)
     assert np.abs(middle / (255 * np.array(SPEED_MAP(0.5)[:3])) - 0.95).max() < 0.15
     assert "speed" not in surface(block, Frame(0.0, "", *[getattr(frame(block), k) for k in ("u", "gamma", "deleted")])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 import pyamg
@@ -124,20 +125,20 @@ class AmgCG:
         Only the values at `nodes` are changed. False if it did not converge.
         """
         matrix, R, nodes = unsigned(A), unsigned(self._R), self.nodes
-        smoother, live = self.omega / D, ~self.dead(D)
         z, t, p, q = (np.zeros_like(r) for _ in range(4))  # zero outside of `nodes`
+        at = _Vectors(x, r, z, t, p, q, self.omega / D, ~self.dead(D))
         part, coarse = np.empty(nodes.size), np.empty(self._R.shape[0])
         rz_old, self.iterations = 1.0, 0
-        _advance(nodes, 0.0, p, q, x, r, smoother, z)
+        _advance(nodes, 0.0, at)
         while self.iterations < self.max_iterations:
-            _restrict(nodes, *matrix, z, r, live, *R, part, coarse)
-            rz = _correct_and_smooth(nodes, *matrix, z, r, smoother, live, *R, self._coarse(coarse), t)
-            pq = _direction(nodes, *matrix, rz / rz_old, t, p, q)
+            _restrict(nodes, matrix, R, at, part, coarse)
+            rz = _correct_and_smooth(nodes, matrix, R, at, self._coarse(coarse))
+            pq = _direction(nodes, matrix, rz / rz_old, at)
             if not (np.isfinite(pq) and pq > 0.0):
                 return False
             rz_old = rz
             self.iterations += 1
-            if _advance(nodes, rz / pq, p, q, x, r, smoother, z) <= target:
+            if _advance(nodes, rz / pq, at) <= target:
                 return True
         return False
 
@@ -149,8 +150,28 @@ def residual(A: csr_array, x: np.ndarray, b: np.ndarray) -> np.ndarray:
     return r
 
 
+class _Vectors(NamedTuple):
+    """Vectors of an iteration.
+
+    Attributes
+    ----------
+    x, r: solution and residual.   z, t: what the preconditioner makes of r, before the last smoothing and after.
+    p, q: direction, and A p.   smoother: Jacobi weight over the diagonal.
+    live: mask of the unknowns that the coarse level corrects.
+    """
+
+    x: np.ndarray
+    r: np.ndarray
+    z: np.ndarray
+    t: np.ndarray
+    p: np.ndarray
+    q: np.ndarray
+    smoother: np.ndarray
+    live: np.ndarray
+
+
 # In the loops below a row of A is taken with the whole vector, which is zero outside of `nodes`. The restriction R
-# (arrays start, column, weight) has a row for each coarse unknown, whose columns m stand for nodes[m]; its rows are
+# has a row for each coarse unknown, whose columns m stand for nodes[m]; its rows are
 # longer than those of the prolongation R^T, and loops over them better to foresee.
 @njit(cache=True)
 def _row(indptr, indices, data, x, i):  # type: ignore[no-untyped-def]
@@ -167,8 +188,11 @@ def _residual(indptr, indices, data, x, b, r):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _restrict(nodes, indptr, indices, data, z, r, live, start, column, weight, part, coarse):  # type: ignore[no-untyped-def]
+def _restrict(nodes, A, R, at, part, coarse):  # type: ignore[no-untyped-def]
     """coarse = R (r - A z) of the live nodes; `part` takes that residual."""
+    indptr, indices, data = A.indptr, A.indices, A.data
+    start, column, weight = R.indptr, R.indices, R.data
+    z, r, live = at.z, at.r, at.live
     for m in range(nodes.size):
         i = nodes[m]
         part[m] = r[i] - _row(indptr, indices, data, z, i) if live[i] else 0.0
@@ -177,9 +201,11 @@ def _restrict(nodes, indptr, indices, data, z, r, live, start, column, weight, p
 
 
 @njit(cache=True)
-def _correct_and_smooth(nodes, indptr, indices, data, z, r, smoother, live,  # type: ignore[no-untyped-def]
-                        start, column, weight, coarse, t):
+def _correct_and_smooth(nodes, A, R, at, coarse):  # type: ignore[no-untyped-def]
     """z += R^T coarse at the live nodes, then t = z + smoother (r - A z); returns r.t."""
+    indptr, indices, data = A.indptr, A.indices, A.data
+    start, column, weight = R.indptr, R.indices, R.data
+    z, r, t, smoother, live = at.z, at.r, at.t, at.smoother, at.live
     for c in range(coarse.size):
         value = coarse[c]
         for k in range(start[c], start[c + 1]):
@@ -194,8 +220,10 @@ def _correct_and_smooth(nodes, indptr, indices, data, z, r, smoother, live,  # t
 
 
 @njit(cache=True)
-def _direction(nodes, indptr, indices, data, beta, t, p, q):  # type: ignore[no-untyped-def]
+def _direction(nodes, A, beta, at):  # type: ignore[no-untyped-def]
     """p = t + beta p, q = A p; returns p.q."""
+    indptr, indices, data = A.indptr, A.indices, A.data
+    t, p, q = at.t, at.p, at.q
     for i in nodes:
         p[i] = t[i] + beta * p[i]
     total = 0.0
@@ -206,8 +234,9 @@ def _direction(nodes, indptr, indices, data, beta, t, p, q):  # type: ignore[no-
 
 
 @njit(cache=True)
-def _advance(nodes, alpha, p, q, x, r, smoother, z):  # type: ignore[no-untyped-def]
+def _advance(nodes, alpha, at):  # type: ignore[no-untyped-def]
     """x += alpha p, r -= alpha q, z = smoother r; returns the norm of r."""
+    p, q, x, r, smoother, z = at.p, at.q, at.x, at.r, at.smoother, at.z
     total = 0.0
     for i in nodes:
         x[i] += alpha * p[i]

@@ -54,11 +54,13 @@ class CompiledMomentum:
     def _tangent(self, part: Part, pattern: Pattern, u: np.ndarray, gamma: np.ndarray, convex: bool) -> np.ndarray:
         material, elements, fibres = part
         if self._plane_stress:
-            return kernels.tangent_plane_stress(self._space, pattern, material, u, gamma, convex, elements)
+            return kernels.tangent_plane_stress(self._space, pattern, material, u, gamma, convex=convex,
+                                                elements=elements)
         if isinstance(material, GeneralMaterial) and fibres is not None:
-            return kernels.tangent_general(self._space, pattern, material, u, gamma, fibres, self._j_bar, convex,
-                                           elements)
-        return kernels.tangent(self._space, pattern, material, u, gamma, self._j_bar, convex, elements)
+            return kernels.tangent_general(self._space, pattern, material, u, gamma, fibres, j_bar=self._j_bar,
+                                           convex=convex, elements=elements)
+        return kernels.tangent(self._space, pattern, material, u, gamma, j_bar=self._j_bar, convex=convex,
+                               elements=elements)
 
     def mass(self, pattern: Pattern, gamma: np.ndarray) -> np.ndarray:
         """Data of the consistent mass matrix; see :class:`.MomentumBackend`."""

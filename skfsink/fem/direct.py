@@ -8,7 +8,7 @@ from __future__ import annotations
 import ctypes
 import os
 from contextlib import AbstractContextManager
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.sparse.linalg as sla
@@ -238,6 +238,14 @@ def symmetric_product(indptr, indices, data, x):  # type: ignore[no-untyped-def]
     return y
 
 
-def unsigned(A: csr_array) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+class Rows(NamedTuple):
+    """A sparse matrix by rows, as compiled loops take it."""
+
+    indptr: np.ndarray
+    indices: np.ndarray
+    data: np.ndarray
+
+
+def unsigned(A: csr_array) -> Rows:
     """CSR arrays with unsigned indices, which spares the compiled loops a test for negative ones: 2.7 times as fast."""
-    return A.indptr.view(np.uint32), A.indices.view(np.uint32), A.data
+    return Rows(A.indptr.view(np.uint32), A.indices.view(np.uint32), A.data)

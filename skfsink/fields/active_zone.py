@@ -79,14 +79,14 @@ class ActiveZone:
         self.residual = 0.0
 
     def solve(self, A: csr_array, D: np.ndarray, b: np.ndarray, x: np.ndarray, tolerance: float,
-              zones: tuple[Zone, ...] = ()) -> tuple[np.ndarray, bool, int, tuple[Zone, ...]]:
+              *, zones: tuple[Zone, ...] = ()) -> tuple[np.ndarray, bool, int, tuple[Zone, ...]]:
         """The solution from the guess `x` (see :meth:`.AmgCG.solve`), whether it meets the target, iterations, zones.
 
         One that does not is the best guess for a solve everywhere. `zones` are those of the solves before, the one
         used last at the end; so are those returned.
         """
         size, x, r = float(np.linalg.norm(b)), x.copy(), residual(A, x, b)
-        _settle(self._amg.dead(D), D, *unsigned(A), x, r)
+        _settle(self._amg.dead(D), D, unsigned(A), x, r)
         self.residual = float(np.linalg.norm(r)) / size
         if self.residual <= tolerance:
             return x, True, 0, zones
@@ -129,8 +129,9 @@ class ActiveZone:
 
 
 @njit(cache=True)
-def _settle(dead, D, indptr, indices, data, x, r):  # type: ignore[no-untyped-def]
+def _settle(dead, D, A, x, r):  # type: ignore[no-untyped-def]
     """Let the values at `dead` nodes follow their sinks, and the residual r with them (A is symmetric)."""
+    indptr, indices, data = A.indptr, A.indices, A.data
     for i in range(x.size):
         if dead[i]:
             change = r[i] / D[i]

@@ -162,7 +162,7 @@ class DensitySolver:
         """Solution by AMG-CG, in the active zone where that is enough, None if it did not converge; and the zones."""
         gamma, zones = before.gamma, before.zones
         if self.zone is not None and tolerance is not None:
-            gamma, met, iterations, zones = self.zone.solve(A, D, self.load, gamma, tolerance, zones)
+            gamma, met, iterations, zones = self.zone.solve(A, D, self.load, gamma, tolerance, zones=zones)
             self.iterations += iterations
             self._residual = self.zone.residual
             if met:

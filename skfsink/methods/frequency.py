@@ -6,7 +6,7 @@ import numpy as np
 import scipy.linalg as la
 
 from ..errors import ConvergenceError, InstabilityError
-from ..fem.direct import add_symmetric_product
+from ..fem.direct import Rows, add_symmetric_product
 from ..fem.pattern import Pattern
 from ..fields.momentum import Momentum
 from ..system.jit import njit
@@ -18,7 +18,7 @@ RESTARTS = 20   # from what they have found
 
 
 def highest_frequency(momentum: Momentum, pattern: Pattern, free: np.ndarray, u: np.ndarray, mass: np.ndarray,
-                      start: np.ndarray | None = None, tolerance: float = 1e-3) -> tuple[float, np.ndarray]:
+                      start: np.ndarray | None = None, *, tolerance: float = 1e-3) -> tuple[float, np.ndarray]:
     """Highest eigenfrequency omega [rad/s] of  K(u) x = omega^2 M x  over the free unknowns, and its vector.
 
     Lanczos on the mass-scaled tangent of the deformed, damaged body. `start` is a starting vector, best the result of
@@ -44,7 +44,7 @@ def _lanczos(indptr: np.ndarray, indices: np.ndarray, data: np.ndarray, start: n
     Its residual |A x - value x| is at most `tolerance` of it. The vectors lose their orthogonality, which gives an
     eigenvalue that has been found a second time, but none that is wrong.
     """
-    residual = np.inf
+    residual, matrix = np.inf, Rows(indptr, indices, data)
     for _ in range(RESTARTS):
         vectors: list[np.ndarray] = [start]
         diagonal: list[float] = []
@@ -52,7 +52,7 @@ def _lanczos(indptr: np.ndarray, indices: np.ndarray, data: np.ndarray, start: n
         previous, beta = np.zeros_like(start), 0.0
         while True:
             following = np.empty_like(start)
-            alpha, beta = _step(indptr, indices, data, vectors[-1], previous, beta, following)
+            alpha, beta = _step(matrix, vectors[-1], previous, beta, following)
             if not np.isfinite(alpha + beta):
                 raise InstabilityError("the tangent of the body is not finite: the explicit integration has blown up")
             diagonal.append(alpha)
@@ -80,11 +80,11 @@ def _scale(indptr, indices, data, scale):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _step(indptr, indices, data, v, previous, beta, following):  # type: ignore[no-untyped-def]
+def _step(A, v, previous, beta, following):  # type: ignore[no-untyped-def]
     """following = (A v - alpha v - beta previous)/|..| for the upper triangle of A; returns alpha and that norm."""
     for i in range(v.size):
         following[i] = -beta * previous[i]
-    add_symmetric_product(indptr, indices, data, v, following)
+    add_symmetric_product(A.indptr, A.indices, A.data, v, following)
     alpha = 0.0
     for i in range(v.size):
         alpha += following[i] * v[i]

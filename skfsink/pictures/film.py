@@ -117,8 +117,8 @@ def _pictures(run: Run, frames: Sequence[Frame], field: str, width: int, view: V
     for frame in frames:
         for artist in list(ax.images):
             artist.remove()
-        body = render(space, frame, camera, box, round(0.82 * width), field, largest if field == "gamma" else
-                      1e3 * largest)
+        body = render(space, frame, camera, box, round(0.82 * width), field=field,
+                      largest=largest if field == "gamma" else 1e3 * largest)
         ax.imshow(body, extent=(box[0, 0], box[1, 0], box[0, 1], box[1, 1]), interpolation="antialiased")
         ax.set_title(frame.title)
         canvas.draw()

@@ -86,4 +86,4 @@ def draw_comparison(dynamic: Result, quasistatic: Result, folder: Path) -> None:
         number = part.summary["moments"].get("arrival", part.summary["moments"]["end"])
         frames.append(read_frame(part.folder / "series" / frame_file("run", number), np.nan, "", space.dim))
     comparison_picture(space, frames[0], frames[1], dynamic.history, quasistatic.history, folder / "comparison.png",
-                       f"{dynamic.scene.title}, mesh {dynamic.scene.sample.name}", dynamic.scene.view)
+                       title=f"{dynamic.scene.title}, mesh {dynamic.scene.sample.name}", view=dynamic.scene.view)

@@ -164,7 +164,7 @@ def save_gif(pictures: Sequence[Image.Image], path: str | Path, seconds: float, 
 
 @matplotlib.rc_context(STYLE)
 def comparison_picture(space: Space, dynamic_frame: Frame, quasistatic_frame: Frame, dyn_history: History,
-                       qs_history: History, path: str | Path, title: str = "", view: View = OBLIQUE) -> None:
+                       qs_history: History, path: str | Path, *, title: str = "", view: View = OBLIQUE) -> None:
     """The dynamic crack beside the quasi-static one, and below them where the energy of both is at the end."""
     bodies, box, ratio = deformed.bodies(space, (dynamic_frame, quasistatic_frame), view)
     tall = min(2.9 * ratio, 6.0)

@@ -109,8 +109,8 @@ def _without_fragments(body: Any) -> Any:
     return pieces.extract_cells(~small[piece]).extract_surface(algorithm="dataset_surface") if small.any() else pieces
 
 
-def render(space: Space, frame: Frame, camera: Camera, box: np.ndarray, width: int, field: str = "gamma",
-           largest: float = 1.0) -> np.ndarray:
+def render(space: Space, frame: Frame, camera: Camera, box: np.ndarray, width: int, *,
+           field: str = "gamma", largest: float = 1.0) -> np.ndarray:
     """The body in colours of a field.
 
     Parameters
@@ -133,13 +133,14 @@ def render(space: Space, frame: Frame, camera: Camera, box: np.ndarray, width: i
     size = box[1] - box[0]
     height = max(1, round(width * float(size[1] / size[0])))
     with pv.vtk_verbosity("off"):  # which tells that there is no display
-        picture = _shot(pv, surface(space, frame), camera, box, (FINER * width, FINER * height), field, largest)
+        picture = _shot(pv, surface(space, frame), camera, box, (FINER * width, FINER * height), field=field,
+                        largest=largest)
     coarse = np.asarray(picture, float).reshape(height, FINER, width, FINER, -1).mean(axis=(1, 3))
     return np.rint(coarse[..., :3]).astype(np.uint8)
 
 
-def _shot(pv: Any, body: Any, camera: Camera, box: np.ndarray, pixels: tuple[int, int], field: str,
-          largest: float) -> np.ndarray:
+def _shot(pv: Any, body: Any, camera: Camera, box: np.ndarray, pixels: tuple[int, int], *,
+          field: str, largest: float) -> np.ndarray:
     right, up, back = camera.axes
     centre, far = box.mean(axis=0) @ camera.axes[:2], 100.0 * float(np.ptp(box, axis=0).max())
     plotter = pv.Plotter(off_screen=True, window_size=pixels, lighting="none")

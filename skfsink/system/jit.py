@@ -70,6 +70,27 @@ class _CacheImpl(_Impl):  # type: ignore[misc]
 class _Cache(caching.FunctionCache):  # type: ignore[misc]
     _impl_class = _CacheImpl
 
+    def _index_key(self, sig: Any, codegen: Any) -> tuple[Any, ...]:
+        """As numba's, but for loops made by a function: what they take from it may be compiled functions."""
+        def hashed(value: bytes) -> str:
+            return hashlib.sha256(value).hexdigest()
+
+        around = repr(_around(self._py_func)).encode()
+        return sig, codegen.magic_tuple(), (hashed(self._py_func.__code__.co_code), hashed(around))
+
+
+def _around(function: Any) -> tuple[Any, ...]:
+    """What a function takes from the one it is made by; a compiled function by its name and what it takes itself.
+
+    The text of the latter is known by the stamp of the file.
+    """
+    found: list[Any] = []
+    for cell in function.__closure__ or ():
+        value = cell.cell_contents
+        inner = getattr(value, "py_func", None)
+        found.append(value if inner is None else (inner.__module__, inner.__qualname__, _around(inner)))
+    return tuple(found)
+
 
 @cache
 def _folder(modules: Path) -> Path | None:

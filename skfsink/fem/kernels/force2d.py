@@ -17,13 +17,22 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...material.compiled import isochoric_law
 from ...system.jit import njit
 from .lanes import FAST, GAUSS_HIGH, GAUSS_LOW, J_FLOOR, LANES, guess_inverse_cbrt, refine_inverse_cbrt
 
 # Rows of the workspace and of the geometry, four Gauss points each: a quantity at Gauss point q of lane i is at
 # (row + q) * LANES + i, so that what is done point by point is one loop over 4 * LANES numbers.
-_F, _J, _I1, _R, _PSI, _DPSI, _JF, _TR, _ROWS = 0, 16, 20, 24, 28, 32, 36, 40, 44
-_W = 16                  # geometry: d xi/d X by component in rows 0-15, then the weights
+F_XX, F_XY, F_YX, F_YY = 0, 4, 8, 12
+J_ROW, I1_ROW, R_ROW, PSI, DPSI, FLOORED, TRACE = 16, 20, 24, 28, 32, 36, 40  # FLOORED: J at first, then 1/J
+ROWS = 44
+XI_X, XI_Y, ETA_X, ETA_Y, WEIGHT = 0, 4, 8, 12, 16  # geometry: d xi/d X by component, then the weights
+
+
+@njit
+def points(rows, first):  # type: ignore[no-untyped-def]
+    """A quantity at the four Gauss points of all lanes, which begins at row `first`."""
+    return rows[first * LANES:(first + 4) * LANES]
 
 
 @njit(fastmath=FAST)
@@ -50,21 +59,21 @@ def _kinematics(z, geo, ws):  # type: ignore[no-untyped-def]
                 g1, g3 = GAUSS_HIGH * (x2 - x0) + GAUSS_LOW * (x3 - x1), GAUSS_HIGH * (y2 - y0) + GAUSS_LOW * (y3 - y1)
             else:
                 g1, g3 = GAUSS_LOW * (x2 - x0) + GAUSS_HIGH * (x3 - x1), GAUSS_LOW * (y2 - y0) + GAUSS_HIGH * (y3 - y1)
-            k0, k1 = geo[q * L + i], geo[(4 + q) * L + i]
-            k2, k3 = geo[(8 + q) * L + i], geo[(12 + q) * L + i]
+            k0, k1 = geo[(XI_X + q) * L + i], geo[(XI_Y + q) * L + i]
+            k2, k3 = geo[(ETA_X + q) * L + i], geo[(ETA_Y + q) * L + i]
             f0, f1, f2, f3 = g0 * k0 + g1 * k2, g0 * k1 + g1 * k3, g2 * k0 + g3 * k2, g2 * k1 + g3 * k3
-            ws[q * L + i], ws[(4 + q) * L + i] = f0, f1
-            ws[(8 + q) * L + i], ws[(12 + q) * L + i] = f2, f3
+            ws[(F_XX + q) * L + i], ws[(F_XY + q) * L + i] = f0, f1
+            ws[(F_YX + q) * L + i], ws[(F_YY + q) * L + i] = f2, f3
             J = f0 * f3 - f1 * f2
-            ws[(_J + q) * L + i] = J
-            ws[(_JF + q) * L + i] = J if J > J_FLOOR else J_FLOOR
-            ws[(_TR + q) * L + i] = f0 * f0 + f1 * f1 + f2 * f2 + f3 * f3 + 1.0
+            ws[(J_ROW + q) * L + i] = J
+            ws[(FLOORED + q) * L + i] = J if J > J_FLOOR else J_FLOOR
+            ws[(TRACE + q) * L + i] = f0 * f0 + f1 * f1 + f2 * f2 + f3 * f3 + 1.0
 
 
 @njit(fastmath=FAST)
 def _invariant(ws):  # type: ignore[no-untyped-def]
     for i in range(4 * LANES):
-        ws[_I1 * LANES + i] = ws[_R * LANES + i] * ws[_TR * LANES + i]
+        ws[I1_ROW * LANES + i] = ws[R_ROW * LANES + i] * ws[TRACE * LANES + i]
 
 
 @njit(fastmath=FAST)
@@ -72,10 +81,11 @@ def _dilatation(geo, gamma, k_bulk, ws, p):  # type: ignore[no-untyped-def]
     """Row 0 of p: gamma_bar k (J_bar - 1); row 1: k/2 (J_bar - 1)^2."""
     L = LANES
     for i in range(L):
-        w0, w1, w2, w3 = geo[_W * L + i], geo[17 * L + i], geo[18 * L + i], geo[19 * L + i]
+        w0, w1 = geo[WEIGHT * L + i], geo[(WEIGHT + 1) * L + i]
+        w2, w3 = geo[(WEIGHT + 2) * L + i], geo[(WEIGHT + 3) * L + i]
         inv_V = 1.0 / (w0 + w1 + w2 + w3)
-        dilatation = (w0 * ws[_J * L + i] + w1 * ws[(_J + 1) * L + i] + w2 * ws[(_J + 2) * L + i]
-                      + w3 * ws[(_J + 3) * L + i]) * inv_V - 1.0
+        dilatation = (w0 * ws[J_ROW * L + i] + w1 * ws[(J_ROW + 1) * L + i] + w2 * ws[(J_ROW + 2) * L + i]
+                      + w3 * ws[(J_ROW + 3) * L + i]) * inv_V - 1.0
         gamma_bar = (w0 * gamma[i] + w1 * gamma[L + i] + w2 * gamma[2 * L + i] + w3 * gamma[3 * L + i]) * inv_V
         p[i] = gamma_bar * k_bulk * dilatation
         p[L + i] = 0.5 * k_bulk * dilatation * dilatation
@@ -109,19 +119,19 @@ def _coefficients(ws, w, gamma, pressure, ab):  # type: ignore[no-untyped-def]
     """The factors a and b of the stress P = a F + b cof F."""
     Q = 4 * LANES
     for i in range(Q):
-        a = 2.0 * w[i] * gamma[i] * ws[8 * Q + i] * ws[6 * Q + i]
+        a = 2.0 * w[i] * gamma[i] * ws[DPSI * LANES + i] * ws[R_ROW * LANES + i]
         ab[i] = a
-        ab[Q + i] = w[i] * pressure[i] - a * ws[10 * Q + i] * ws[9 * Q + i] * (1 / 3.0)
+        ab[Q + i] = w[i] * pressure[i] - a * ws[TRACE * LANES + i] * ws[FLOORED * LANES + i] * (1 / 3.0)
 
 
 @njit(fastmath=FAST)
 def _stress(ws, geo, ab, t):  # type: ignore[no-untyped-def]
     """Stress pulled back to the reference square, T_i,d = P_iJ d xi_d/d X_J."""
-    Q = 4 * LANES
+    L, Q = LANES, 4 * LANES
     for i in range(Q):
         a, b = ab[i], ab[Q + i]
-        f0, f1, f2, f3 = ws[i], ws[Q + i], ws[2 * Q + i], ws[3 * Q + i]
-        k0, k1, k2, k3 = geo[i], geo[Q + i], geo[2 * Q + i], geo[3 * Q + i]
+        f0, f1, f2, f3 = ws[F_XX * L + i], ws[F_XY * L + i], ws[F_YX * L + i], ws[F_YY * L + i]
+        k0, k1, k2, k3 = geo[XI_X * L + i], geo[XI_Y * L + i], geo[ETA_X * L + i], geo[ETA_Y * L + i]
         P0, P1, P2, P3 = a * f0 + b * f3, a * f1 - b * f2, a * f2 - b * f1, a * f3 + b * f0
         t[i] = P0 * k0 + P1 * k1
         t[Q + i] = P0 * k2 + P1 * k3
@@ -169,17 +179,21 @@ def least_live(J, gamma, least):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, fastmath=FAST, nogil=True)
-def force_2d(law, constants, k_bulk, conn, x, geometry, gamma, j_bar, force, W, psi):  # type: ignore[no-untyped-def]
+def force_2d(address, constants, volumetric_part, x, elements):  # type: ignore[no-untyped-def]
+    law = isochoric_law(address)
+    k_bulk, j_bar = volumetric_part.bulk_modulus, volumetric_part.j_bar
+    conn, geometry, gamma = elements.conn, elements.geometry, elements.gamma
+    force, W, psi = elements.force, elements.W, elements.psi
     Q = 4 * LANES
-    ws, z = np.empty(_ROWS * LANES), np.empty(8 * LANES)
+    ws, z = np.empty(ROWS * LANES), np.empty(8 * LANES)
     t, p, ab = np.empty(4 * Q), np.empty(2 * LANES), np.empty(2 * Q)
     pressure, volumetric, ddpsi = np.empty(Q), np.empty(Q), np.empty(Q)
-    J, I1, R, psi_q = ws[4 * Q:5 * Q], ws[5 * Q:6 * Q], ws[6 * Q:7 * Q], ws[7 * Q:8 * Q]
-    dpsi, floored = ws[8 * Q:9 * Q], ws[9 * Q:10 * Q]  # floored: J at first, then 1/J
+    J, I1, R, psi_q = points(ws, J_ROW), points(ws, I1_ROW), points(ws, R_ROW), points(ws, PSI)
+    dpsi, floored = points(ws, DPSI), points(ws, FLOORED)
     least = np.ones(Q)
     for b in range(conn.shape[0]):
         geo, g = geometry[b].reshape(-1), gamma[b].reshape(-1)
-        w = geo[4 * Q:]
+        w = geo[WEIGHT * LANES:]
         _gather(conn[b], x, z)
         _kinematics(z, geo, ws)
         least_live(J, g, least)

@@ -10,10 +10,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...material.compiled import isochoric_law
 from ...system.jit import njit
 from .force2d import _add, _dilatation_plain, least_live
 from .lanes import FAST, GAUSS_HIGH, GAUSS_LOW, J_FLOOR, guess_inverse_cbrt, refine_inverse_cbrt
 from .lanes import LANES_3D as LANES
+
+WEIGHT = 9  #: geometry: nine components of d xi/d X at the eight Gauss points, then the weights
 
 
 @njit(fastmath=FAST)
@@ -187,7 +190,11 @@ def _energy(w, gamma, W, psi):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, fastmath=FAST, nogil=True)
-def force_3d(law, constants, k_bulk, conn, x, geometry, gamma, j_bar, force, W, psi):  # type: ignore[no-untyped-def]
+def force_3d(address, constants, volumetric_part, x, elements):  # type: ignore[no-untyped-def]
+    law = isochoric_law(address)
+    k_bulk, j_bar = volumetric_part.bulk_modulus, volumetric_part.j_bar
+    conn, geometry, gamma = elements.conn, elements.geometry, elements.gamma
+    force, W, psi = elements.force, elements.W, elements.psi
     L, Q = LANES, 8 * LANES
     z, g, t = np.empty(24 * L), np.empty(3 * Q), np.empty(3 * Q)
     F, P = np.empty(9 * Q), np.empty(9 * Q)
@@ -197,7 +204,7 @@ def force_3d(law, constants, k_bulk, conn, x, geometry, gamma, j_bar, force, W, 
     least = np.ones(Q)
     for tile in range(conn.shape[0]):
         geo, gam = geometry[tile].reshape(-1), gamma[tile].reshape(-1)
-        w = geo[9 * Q:]
+        w = geo[WEIGHT * Q:]
         _gather(conn[tile], x, z)
         for c in range(3):
             _gradient(z[8 * c * L:8 * (c + 1) * L], g)

@@ -12,8 +12,11 @@ each element, three rows for each family, tiled.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
+from ...material.compiled import general_law
 from ...system.jit import njit
 from . import force2d, force3d
 from .lanes import FAST, LANES, LANES_3D, guess_inverse_cbrt, refine_inverse_cbrt
@@ -24,9 +27,19 @@ _Q = 4 * LANES
 _Q3 = 8 * LANES_3D
 
 
+class _Isochoric(NamedTuple):
+    """R = J^(-2/3), 1/J, the invariants (m, n), and the derivatives of psi with them."""
+
+    R: np.ndarray
+    inverse_J: np.ndarray
+    I: np.ndarray
+    d: np.ndarray
+
+
 @njit(fastmath=FAST)
-def _coefficients(w, gamma, pressure, R, inverse, I, d, ab, c):  # type: ignore[no-untyped-def]
+def _coefficients(w, gamma, pressure, isochoric, ab, c):  # type: ignore[no-untyped-def]
     """a and b without the part of I2' in a; the rows of c are e, then c_f of each family."""
+    R, inverse, I, d = isochoric.R, isochoric.inverse_J, isochoric.I, isochoric.d
     Q = R.size
     for i in range(Q):
         wg = w[i] * gamma[i]
@@ -81,18 +94,22 @@ def _fibre_stress_2d(ws, geo, fibres, c, t):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, fastmath=FAST, nogil=True)
-def force_general_2d(law, constants, k_bulk, conn, x, geometry, gamma, fibres, j_bar, force, W, psi):  # type: ignore[no-untyped-def]
-    """Arguments and results as of :func:`.force2d.force_2d`, and the directions of the fibres."""
+def force_general_2d(address, constants, volumetric_part, x, elements):  # type: ignore[no-untyped-def]
+    """Arguments and results as of :func:`.force2d.force_2d`."""
+    law = general_law(address)
+    k_bulk, j_bar = volumetric_part.bulk_modulus, volumetric_part.j_bar
+    conn, geometry, gamma = elements.conn, elements.geometry, elements.gamma
+    fibres, force, W, psi = elements.fibres, elements.force, elements.W, elements.psi
     m = 2 + fibres.shape[1] // 3
-    ws, z, t, p = np.empty(11 * _Q), np.empty(8 * LANES), np.empty(4 * _Q), np.empty(2 * LANES)
+    ws, z, t, p = np.empty(force2d.ROWS * LANES), np.empty(8 * LANES), np.empty(4 * _Q), np.empty(2 * LANES)
     ab, pressure, volumetric = np.empty(2 * _Q), np.empty(_Q), np.empty(_Q)
     I, d, dd, c = np.empty((m, _Q)), np.zeros((m, _Q)), np.zeros((m, m, _Q)), np.empty((m - 1, _Q))
-    J, R, psi_q = ws[4 * _Q:5 * _Q], ws[6 * _Q:7 * _Q], np.empty(_Q)
-    floored, tr = ws[9 * _Q:10 * _Q], ws[10 * _Q:11 * _Q]
+    J, R, psi_q = force2d.points(ws, force2d.J_ROW), force2d.points(ws, force2d.R_ROW), np.empty(_Q)
+    floored, tr = force2d.points(ws, force2d.FLOORED), force2d.points(ws, force2d.TRACE)
     least = np.ones(_Q)
     for b in range(conn.shape[0]):
         geo, g = geometry[b].reshape(-1), gamma[b].reshape(-1)
-        w = geo[4 * _Q:]
+        w = geo[force2d.WEIGHT * LANES:]
         force2d._gather(conn[b], x, z)
         force2d._kinematics(z, geo, ws)
         force2d.least_live(J, g, least)
@@ -105,7 +122,7 @@ def force_general_2d(law, constants, k_bulk, conn, x, geometry, gamma, fibres, j
             force2d._spread(p, pressure, volumetric)
         else:
             force2d._dilatation_plain(g, k_bulk, J, pressure, volumetric)
-        _coefficients(w, g, pressure, R, floored, I, d, ab, c)  # by now 1/J
+        _coefficients(w, g, pressure, _Isochoric(R, floored, I, d), ab, c)  # floored: by now 1/J
         _second_2d(J, c, ab)
         force2d._stress(ws, geo, ab, t)
         _fibre_stress_2d(ws, geo, fibres[b], c, t)
@@ -180,8 +197,12 @@ def _fibre_stress_3d(F, fibres, c, P):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, fastmath=FAST, nogil=True)
-def force_general_3d(law, constants, k_bulk, conn, x, geometry, gamma, fibres, j_bar, force, W, psi):  # type: ignore[no-untyped-def]
-    """Arguments and results as of :func:`.force3d.force_3d`, and the directions of the fibres."""
+def force_general_3d(address, constants, volumetric_part, x, elements):  # type: ignore[no-untyped-def]
+    """Arguments and results as of :func:`.force3d.force_3d`."""
+    law = general_law(address)
+    k_bulk, j_bar = volumetric_part.bulk_modulus, volumetric_part.j_bar
+    conn, geometry, gamma = elements.conn, elements.geometry, elements.gamma
+    fibres, force, W, psi = elements.fibres, elements.force, elements.W, elements.psi
     L, Q, m = LANES_3D, _Q3, 2 + fibres.shape[1] // 3
     z, g, t = np.empty(24 * L), np.empty(3 * Q), np.empty(3 * Q)
     F, P = np.empty(9 * Q), np.empty(9 * Q)
@@ -191,7 +212,7 @@ def force_general_3d(law, constants, k_bulk, conn, x, geometry, gamma, fibres, j
     least = np.ones(Q)
     for tile in range(conn.shape[0]):
         geo, gam = geometry[tile].reshape(-1), gamma[tile].reshape(-1)
-        w = geo[9 * Q:]
+        w = geo[force3d.WEIGHT * Q:]
         force3d._gather(conn[tile], x, z)
         for i in range(3):
             force3d._gradient(z[8 * i * L:8 * (i + 1) * L], g)
@@ -207,7 +228,7 @@ def force_general_3d(law, constants, k_bulk, conn, x, geometry, gamma, fibres, j
             force3d._dilatation(mean, k_bulk, pressure, volumetric)
         else:
             force2d._dilatation_plain(gam, k_bulk, J, pressure, volumetric)
-        _coefficients(w, gam, pressure, R, floored, I, d, ab, c)
+        _coefficients(w, gam, pressure, _Isochoric(R, floored, I, d), ab, c)
         force3d._piola(F, ab, P)
         _second_3d(F, tr, c, P)
         _fibre_stress_3d(F, fibres[tile], c, P)

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..pattern import Pattern
 from ..space import Space
+from .records import Piece
 
 __all__ = ["pieces"]
 
@@ -15,19 +16,21 @@ PIECE = 4096  # elements whose data is copied at a time
 
 
 def pieces(space: Space, pattern: Pattern, gamma: np.ndarray, elements: np.ndarray | None,
-           *more: np.ndarray) -> Iterator[tuple[np.ndarray, ...]]:
-    """(conn, dN, w, gamma, slot, `more`...) of the `elements`, some at a time; of all (None) without a copy.
+           fibres: np.ndarray | None = None) -> Iterator[Piece]:
+    """Data of the `elements`, some at a time; of all (None) without a copy.
 
-    `gamma` (ne, nq) is numbered over the whole body, as the arrays of `space` are; `more` over `elements`.
+    `gamma` (ne, nq) is numbered over the whole body, as the arrays of `space` are; `fibres` over `elements`.
     """
-    arrays = space.conn, space.dN, space.w, np.ascontiguousarray(gamma), pattern.slot
+    if fibres is None:
+        fibres = np.empty((space.n_elements if elements is None else elements.size, 0, 3))
+    whole = space.conn, space.dN, space.w, np.ascontiguousarray(gamma), pattern.slot
     if elements is None:
-        yield (*arrays, *map(np.ascontiguousarray, more))
+        yield Piece(*whole, np.ascontiguousarray(fibres))
         return
     for start in range(0, elements.size, PIECE):
         part = slice(start, start + PIECE)
-        yield (*(_taken(array, elements[part]) for array in arrays),
-               *(np.ascontiguousarray(array[part]) for array in more))
+        conn, dN, w, at_points, slot = (_taken(array, elements[part]) for array in whole)
+        yield Piece(conn, dN, w, at_points, slot, np.ascontiguousarray(fibres[part]))
 
 
 def _taken(array: np.ndarray, rows: np.ndarray) -> np.ndarray:

@@ -18,12 +18,27 @@ from __future__ import annotations
 import numpy as np
 
 from ...material import Material
+from ...material.compiled import isochoric_law
 from ...system.jit import njit
 from ..pattern import Pattern
 from ..space import Space
-from .force2d import _energy, _gather, _kinematics, _nodal_force, _stress, least_live
+from .force2d import (
+    FLOORED,
+    J_ROW,
+    ROWS,
+    TRACE,
+    WEIGHT,
+    _energy,
+    _gather,
+    _kinematics,
+    _nodal_force,
+    _stress,
+    least_live,
+    points,
+)
 from .lanes import FAST, J_FLOOR, LANES
 from .pieces import pieces
+from .records import Solid
 from .tangent import ERSATZ_STIFFNESS, SOFT_GAMMA
 
 __all__ = ["force_plane_stress", "stiffness_plane_stress", "tangent_plane_stress"]
@@ -34,6 +49,7 @@ LONGEST = 0.2          # of a Newton step in log y, and 0.3 of what its correcti
 _Q = 4 * LANES
 
 
+# These functions take arrays one by one: a record of them costs the loops 10 to 20 %, see PART in tangent.py.
 @njit(fastmath=FAST)
 def _invariants(y, t, inv_j, p, s, I1):  # type: ignore[no-untyped-def]
     for i in range(y.size):
@@ -106,16 +122,19 @@ def _density(psi, y, k_bulk, W):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, fastmath=FAST, nogil=True)
-def force_plane_stress(law, constants, k_bulk, conn, x, geometry, gamma, j_bar, force, W, psi):  # type: ignore[no-untyped-def]
+def force_plane_stress(address, constants, volumetric_part, x, elements):  # type: ignore[no-untyped-def]
     """Arguments and results as of :func:`.force2d.force_2d`; `j_bar` has no meaning here."""
-    ws, z, t_stress, ab = np.empty(11 * _Q), np.empty(8 * LANES), np.empty(4 * _Q), np.empty(2 * _Q)
+    law, k_bulk = isochoric_law(address), volumetric_part.bulk_modulus
+    conn, geometry, gamma = elements.conn, elements.geometry, elements.gamma
+    force, W, psi = elements.force, elements.W, elements.psi
+    ws, z, t_stress, ab = np.empty(ROWS * LANES), np.empty(8 * LANES), np.empty(4 * _Q), np.empty(2 * _Q)
     inv_j, y, p, s, I1 = np.empty(_Q), np.empty(_Q), np.empty(_Q), np.empty(_Q), np.empty(_Q)
     psi_q, dpsi, ddpsi = np.empty(_Q), np.empty(_Q), np.empty(_Q)
-    J, j, t = ws[4 * _Q:5 * _Q], ws[9 * _Q:10 * _Q], ws[10 * _Q:11 * _Q]
+    J, j, t = points(ws, J_ROW), points(ws, FLOORED), points(ws, TRACE)
     least = np.ones(_Q)
     for b in range(conn.shape[0]):
         geo, g = geometry[b].reshape(-1), gamma[b].reshape(-1)
-        w = geo[4 * _Q:]
+        w = geo[WEIGHT * LANES:]
         _gather(conn[b], x, z)
         _kinematics(z, geo, ws)
         _shift(t)
@@ -132,16 +151,16 @@ def force_plane_stress(law, constants, k_bulk, conn, x, geometry, gamma, j_bar, 
 
 # --- second derivatives ---
 def tangent_plane_stress(space: Space, pattern: Pattern, material: Material, u: np.ndarray, gamma: np.ndarray,
-                         convex: bool = False, elements: np.ndarray | None = None) -> np.ndarray:
+                         *, convex: bool = False, elements: np.ndarray | None = None) -> np.ndarray:
     """Data of the tangent on `pattern` at the displacement `u` (n, 2) and Gauss point densities `gamma` (ne, nq).
 
     Its Gauss points are soft as in :func:`.tangent.tangent`. With `convex` no point is unstable. With `elements` it is
     that of these alone.
     """
     data, x = np.zeros(pattern.nnz), space.X + u
-    for conn, dN, w, at_gauss, slot in pieces(space, pattern, gamma, elements):
-        _tangent(material.compiled_law, material.constants, material.bulk_modulus, material.shear_modulus, conn, x, dN,
-                 w, at_gauss, convex, slot, data)
+    solid = Solid(material.bulk_modulus, material.shear_modulus, False, convex)
+    for piece in pieces(space, pattern, gamma, elements):
+        _tangent(material.compiled_law.address, material.constants, solid, x, piece, data)
     return data
 
 
@@ -172,7 +191,7 @@ def _second(inv_j, y, p, s, dpsi, ddpsi, k_bulk, convex, c):  # type: ignore[no-
 
 
 @njit(cache=True, fastmath=FAST, nogil=True)
-def _tangent(law, constants, k_bulk, mu, conn, x, dN, w, gamma, convex, slot, data):  # type: ignore[no-untyped-def]
+def _tangent(address, constants, solid, x, piece, data):  # type: ignore[no-untyped-def]
     """With n_a = F Grad N_a and c_a = cof F Grad N_a (so dt = 2 n.du and dj = c.du) one Gauss point gives
 
         w gamma [2 W_t Grad N_a.Grad N_b I + W_j j'' + 4 W_tt n n^T + 2 W_tj (n c^T + c n^T) + W_jj c c^T].
@@ -180,6 +199,9 @@ def _tangent(law, constants, k_bulk, mu, conn, x, dN, w, gamma, convex, slot, da
     The first two together are positive for |W_j| <= 2 W_t, to which `convex` bounds W_j: beyond, the sheet buckles.
     It also leaves out the concave part that the volumetric energy has, in log J, at J < 1/2.
     """
+    law = isochoric_law(address)
+    k_bulk, mu, convex = solid.bulk_modulus, solid.shear_modulus, solid.convex
+    conn, dN, w, gamma, slot = piece.conn, piece.dN, piece.w, piece.gamma, piece.slot
     K, n, c = np.empty((8, 8)), np.empty((4, 8)), np.empty((4, 8))
     t, j, inv_j, y, p, s = np.empty(4), np.empty(4), np.empty(4), np.empty(4), np.empty(4), np.empty(4)
     I1, psi, dpsi, ddpsi, W = np.empty(4), np.empty(4), np.empty(4), np.empty(4), np.empty((5, 4))
@@ -256,21 +278,23 @@ def _quadratic(ws, d, W, w, gamma, form):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, fastmath=FAST, nogil=True)
-def stiffness_plane_stress(law, constants, k_bulk, conn, x, geometry, gamma, inverse_mass):  # type: ignore[no-untyped-def]
+def stiffness_plane_stress(address, constants, k_bulk, x, elements, inverse_mass):  # type: ignore[no-untyped-def]
     """Greatest Rayleigh quotient of the tangent and the mass for M^-1 b of an element [1/s^2], b = dJ_mean/du.
 
     b is the force of an all-round tension, and its motion about the stiffest an element has. Neighbours add to the
     quotient while they are stable, so it is a lower bound of the highest frequency squared.
     """
-    ws, d, z, b = np.empty(11 * _Q), np.empty(11 * _Q), np.empty(8 * LANES), np.empty(8 * LANES)
+    law = isochoric_law(address)
+    conn, geometry, gamma = elements.conn, elements.geometry, elements.gamma
+    ws, d, z, b = np.empty(ROWS * LANES), np.empty(ROWS * LANES), np.empty(8 * LANES), np.empty(8 * LANES)
     t_stress, ab, norm, form = np.empty(4 * _Q), np.zeros(2 * _Q), np.empty(LANES), np.empty(_Q)
     inv_j, y, p, s, I1 = np.empty(_Q), np.empty(_Q), np.empty(_Q), np.empty(_Q), np.empty(_Q)
     psi_q, dpsi, ddpsi, W = np.empty(_Q), np.empty(_Q), np.empty(_Q), np.empty((5, _Q))
-    j, t = ws[9 * _Q:10 * _Q], ws[10 * _Q:11 * _Q]
+    j, t = points(ws, FLOORED), points(ws, TRACE)
     greatest = 0.0
     for tile in range(conn.shape[0]):
         geo, g = geometry[tile].reshape(-1), gamma[tile].reshape(-1)
-        w = geo[4 * _Q:]
+        w = geo[WEIGHT * LANES:]
         ab[_Q:] = w
         _gather(conn[tile], x, z)
         _kinematics(z, geo, ws)

@@ -10,11 +10,12 @@ __all__ = ["relax"]
 
 
 @njit(cache=True, nogil=True)
-def relax(conn, nodal, N, deleted, floor, geometry, W, gamma):  # type: ignore[no-untyped-def]
-    """Values at the Gauss points of the nodal field, zero below `floor` and where `deleted`, into `gamma`.
+def relax(nodal, N, deleted, floor, elements):  # type: ignore[no-untyped-def]
+    """Values at the Gauss points of the nodal field, zero below `floor` and where `deleted`, into `elements.gamma`.
 
     Returns  sum_q w_q W_q (old - new), with W as last evaluated. The rows of the geometry after d xi/d X are weights.
     """
+    conn, geometry, W, gamma = elements.conn, elements.geometry, elements.W, elements.gamma
     tiles, na, lanes = conn.shape
     first = geometry.shape[1] - na
     x, value, total = np.empty((na, lanes)), np.empty(lanes), 0.0

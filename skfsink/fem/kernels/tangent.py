@@ -22,11 +22,13 @@ from typing import Any
 import numpy as np
 
 from ...material import Material
+from ...material.compiled import isochoric_law
 from ...system.jit import njit
 from ..pattern import Pattern
 from ..space import Space
 from .lanes import J_FLOOR
 from .pieces import pieces
+from .records import Solid
 
 __all__ = ["ERSATZ_STIFFNESS", "SOFT_GAMMA", "tangent"]
 
@@ -35,7 +37,7 @@ SOFT_GAMMA = 1e-3
 
 
 def tangent(space: Space, pattern: Pattern, material: Material, u: np.ndarray, gamma: np.ndarray,
-            j_bar: bool = True, convex: bool = False, elements: np.ndarray | None = None) -> np.ndarray:
+            *, j_bar: bool = True, convex: bool = False, elements: np.ndarray | None = None) -> np.ndarray:
     """Data of the tangent on `pattern` at the displacement `u` (n, dim) and Gauss point densities `gamma` (ne, nq).
 
     With `convex` the pressure in the geometric part is bounded where it would make a Gauss point unstable. With
@@ -43,9 +45,9 @@ def tangent(space: Space, pattern: Pattern, material: Material, u: np.ndarray, g
     """
     data, x = np.zeros(pattern.nnz), space.X + u
     loop = _tangent_2d if space.dim == 2 else _tangent_3d
-    for conn, dN, w, at_gauss, slot in pieces(space, pattern, gamma, elements):
-        loop(material.compiled_law, material.constants, material.bulk_modulus, material.shear_modulus, conn, x, dN, w,
-             at_gauss, j_bar, convex, slot, data)
+    solid = Solid(material.bulk_modulus, material.shear_modulus, j_bar, convex)
+    for piece in pieces(space, pattern, gamma, elements):
+        loop(material.compiled_law.address, material.constants, solid, x, piece, data)
     return data
 
 
@@ -69,15 +71,94 @@ def _greatest(F, tr):  # type: ignore[no-untyped-def]
     return m + 2.0 * r * np.cos(np.arccos(cosine) / 3.0)
 
 
+#: Options of the parts of a loop: numba puts them into it before the compiler sees it, as if they were written there.
+#: The order of the sums in a loop, which the compiler may change, then does not depend on how it is taken apart. What
+#: is left in the loop below would change its last bits (the factors of a Gauss point) or cost it 5 % (the gradients of
+#: the shape functions) as a part, and a record of its arrays a third in 2D, whose references are counted at each use.
+PART: dict[str, Any] = {"inline": "always"}
+
+
+@njit(**PART)
+def _cofactor(F, G):  # type: ignore[no-untyped-def]
+    G[0, 0] = F[1, 1] * F[2, 2] - F[1, 2] * F[2, 1]
+    G[0, 1] = F[1, 2] * F[2, 0] - F[1, 0] * F[2, 2]
+    G[0, 2] = F[1, 0] * F[2, 1] - F[1, 1] * F[2, 0]
+    G[1, 0] = F[0, 2] * F[2, 1] - F[0, 1] * F[2, 2]
+    G[1, 1] = F[0, 0] * F[2, 2] - F[0, 2] * F[2, 0]
+    G[1, 2] = F[0, 1] * F[2, 0] - F[0, 0] * F[2, 1]
+    G[2, 0] = F[0, 1] * F[1, 2] - F[0, 2] * F[1, 1]
+    G[2, 1] = F[0, 2] * F[1, 0] - F[0, 0] * F[1, 2]
+    G[2, 2] = F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]
+
+
+def parts(dim: int) -> tuple[Callable[..., Any], ...]:
+    """Parts of the element loops for one dimension: deformation, volumetric coupling, and scatter."""
+    na = 2**dim
+    nd = na * dim
+
+    @njit(**PART)
+    def deformation(x, piece, e, q, F):  # type: ignore[no-untyped-def]
+        """F = Grad x at Gauss point q, with F_33 = 1 in a plane."""
+        F[:] = 0.0
+        F[2, 2] = 1.0
+        for i in range(dim):
+            for j in range(dim):
+                s = 0.0
+                for a in range(na):
+                    s += x[piece.conn[e, a], i] * piece.dN[e, q, a, j]
+                F[i, j] = s
+
+    @njit(**PART)
+    def volumetric_coupling(factor, b, K):  # type: ignore[no-untyped-def]
+        """gamma_bar k V b b^T on the upper triangle."""
+        for i in range(nd):
+            for j in range(i, nd):
+                K[i, j] = factor * b[i] * b[j]
+
+    @njit(**PART)
+    def scatter(K, slot, e, data):  # type: ignore[no-untyped-def]
+        """Adds the symmetric matrix of an element, of which the upper triangle is there."""
+        for i in range(nd):
+            for j in range(nd):
+                k = slot[e, i, j]
+                if k >= 0:
+                    data[k] += K[i, j] if i <= j else K[j, i]
+
+    return deformation, volumetric_coupling, scatter
+
+
 def _make(dim: int) -> Callable[..., Any]:
     """The element loop for one dimension, with its sizes as constants so that the compiler unrolls it."""
     na = 2**dim
     nd = na * dim
+    deformation, volumetric_coupling, scatter = parts(dim)
+
+    @njit(**PART)
+    def products(where, factors, dN, g, Az, K):  # type: ignore[no-untyped-def]
+        """Adds the isochoric and the geometric part of a Gauss point on the upper triangle."""
+        e, q = where
+        direct, c2, crossed = factors
+        for a in range(na):
+            for bb in range(a, na):
+                s = 0.0
+                for j in range(dim):
+                    s += dN[e, q, a, j] * dN[e, q, bb, j]
+                s *= direct
+                for i in range(dim):
+                    ai = dim * a + i
+                    for k in range(dim):
+                        bk = dim * bb + k
+                        K[ai, bk] += (c2 * Az[0, ai] * Az[0, bk] + Az[1, ai] * g[q, bk] + g[q, ai] * Az[1, bk]
+                                      + crossed * g[q, dim * a + k] * g[q, dim * bb + i])
+                    K[ai, dim * bb + i] += s
 
     @njit(cache=True, fastmath={"contract", "arcp", "nsz", "reassoc"}, nogil=True)
-    def loop(law, constants, k_bulk, mu, conn, x, dN, w, gamma, j_bar, convex, slot, data):  # type: ignore[no-untyped-def]
+    def loop(address, constants, solid, x, piece, data):  # type: ignore[no-untyped-def]
+        law = isochoric_law(address)
+        k_bulk, mu, j_bar, convex = solid.bulk_modulus, solid.shear_modulus, solid.j_bar, solid.convex
+        conn, dN, w, gamma, slot = piece.conn, piece.dN, piece.w, piece.gamma, piece.slot
         K, b = np.empty((nd, nd)), np.empty(nd)
-        g, nf, A, z = np.empty((na, nd)), np.empty((na, nd)), np.empty(nd), np.empty(nd)
+        g, nf, Az = np.empty((na, nd)), np.empty((na, nd)), np.empty((2, nd))
         F, G = np.empty((3, 3)), np.empty((3, 3))
         J, tr, I1, R = np.empty(na), np.empty(na), np.empty(na), np.empty(na)
         least = np.empty(na)
@@ -87,23 +168,8 @@ def _make(dim: int) -> Callable[..., Any]:
             b[:] = 0.0
             V, mean, gamma_bar = 0.0, 0.0, 0.0
             for q in range(na):
-                F[:] = 0.0
-                F[2, 2] = 1.0
-                for i in range(dim):
-                    for j in range(dim):
-                        s = 0.0
-                        for a in range(na):
-                            s += x[conn[e, a], i] * dN[e, q, a, j]
-                        F[i, j] = s
-                G[0, 0] = F[1, 1] * F[2, 2] - F[1, 2] * F[2, 1]   # cof F
-                G[0, 1] = F[1, 2] * F[2, 0] - F[1, 0] * F[2, 2]
-                G[0, 2] = F[1, 0] * F[2, 1] - F[1, 1] * F[2, 0]
-                G[1, 0] = F[0, 2] * F[2, 1] - F[0, 1] * F[2, 2]
-                G[1, 1] = F[0, 0] * F[2, 2] - F[0, 2] * F[2, 0]
-                G[1, 2] = F[0, 1] * F[2, 0] - F[0, 0] * F[2, 1]
-                G[2, 0] = F[0, 1] * F[1, 2] - F[0, 2] * F[1, 1]
-                G[2, 1] = F[0, 2] * F[1, 0] - F[0, 0] * F[1, 2]
-                G[2, 2] = F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]
+                deformation(x, piece, e, q, F)
+                _cofactor(F, G)
                 det = F[0, 0] * G[0, 0] + F[0, 1] * G[0, 1] + F[0, 2] * G[0, 2]
                 t = 0.0
                 for i in range(3):
@@ -132,10 +198,7 @@ def _make(dim: int) -> Callable[..., Any]:
             gamma_bar /= V
             law(I1, constants, psi, dpsi, ddpsi)
             if j_bar:
-                factor = gamma_bar * k_bulk / V
-                for i in range(nd):
-                    for j in range(i, nd):
-                        K[i, j] = factor * b[i] * b[j]
+                volumetric_coupling(gamma_bar * k_bulk / V, b, K)
             for q in range(na):
                 wg = w[e, q] * gamma[e, q]
                 c1 = wg * dpsi[q] * R[q]
@@ -151,26 +214,10 @@ def _make(dim: int) -> Callable[..., Any]:
                 crossed = 2.0 / 3.0 * tr[q] * c1 - wpJ
                 soft = w[e, q] * ERSATZ_STIFFNESS * mu if gamma[e, q] < SOFT_GAMMA else 0.0
                 for i in range(nd):
-                    A[i] = R[q] * (2.0 * nf[q, i] - 2.0 / 3.0 * tr[q] * g[q, i])
-                    z[i] = straight * g[q, i] - 4.0 / 3.0 * c1 * nf[q, i]
-                for a in range(na):
-                    for bb in range(a, na):
-                        s = 0.0
-                        for j in range(dim):
-                            s += dN[e, q, a, j] * dN[e, q, bb, j]
-                        s *= 2.0 * c1 + soft
-                        for i in range(dim):
-                            ai = dim * a + i
-                            for k in range(dim):
-                                bk = dim * bb + k
-                                K[ai, bk] += (c2 * A[ai] * A[bk] + z[ai] * g[q, bk] + g[q, ai] * z[bk]
-                                              + crossed * g[q, dim * a + k] * g[q, dim * bb + i])
-                            K[ai, dim * bb + i] += s
-            for i in range(nd):
-                for j in range(nd):
-                    k = slot[e, i, j]
-                    if k >= 0:
-                        data[k] += K[i, j] if i <= j else K[j, i]
+                    Az[0, i] = R[q] * (2.0 * nf[q, i] - 2.0 / 3.0 * tr[q] * g[q, i])
+                    Az[1, i] = straight * g[q, i] - 4.0 / 3.0 * c1 * nf[q, i]
+                products((e, q), (2.0 * c1 + soft, c2, crossed), dN, g, Az, K)
+            scatter(K, slot, e, data)
 
     return loop
 

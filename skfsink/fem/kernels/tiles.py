@@ -12,7 +12,7 @@ Bytes an explicit step has to move for one quadrilateral (hexahedron): 16 (32) c
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numba
@@ -24,13 +24,11 @@ from ..space import Space
 from .faster import Faster
 from .lanes import LANES, LANES_3D
 from .plane_stress import stiffness_plane_stress
+from .records import Elements, Volumetric
 from .relax import relax
-from .shared import FORCES, GENERAL_FORCES, VOLUMETRIC
+from .shared import FORCES, GENERAL_FORCES, VOLUMETRIC, Loops
 
 __all__ = ["Law", "Tiles"]
-
-Loops = tuple[Callable[..., float], Callable[..., None]]   # for one thread, and for several
-
 
 class Law(NamedTuple):
     """Stored energy as the loops take it: psi, its constants, and the bulk modulus [MPa]."""
@@ -41,16 +39,10 @@ class Law(NamedTuple):
 
 
 class _Part(NamedTuple):
-    """Tiles of the elements of one material, parts of the arrays of the whole body."""
+    """Tiles of the elements of one material, parts of the arrays of the whole body, and the loops for them."""
 
     loops: Loops
-    conn: np.ndarray
-    geometry: np.ndarray
-    gamma: np.ndarray
-    fibres: tuple[np.ndarray, ...]
-    force: np.ndarray
-    W: np.ndarray
-    psi: np.ndarray
+    elements: Elements
 
 
 class Tiles:
@@ -89,11 +81,15 @@ class Tiles:
         self.W = np.zeros((self.count, na, self.lanes))
         self.psi = np.zeros((self.count, self.lanes))
         self._force = np.zeros((self.count, na * dim, self.lanes))
-        self._parts = [_Part(
-            FORCES[0 if plane_stress else dim] if fibres is None else GENERAL_FORCES[dim],
-            self.conn[a:b], self.geometry[a:b], self.gamma[a:b],
-            () if fibres is None else (_in_tiles(fibres.reshape(len(fibres), -1), self.lanes),),
-            self._force[a:b], self.W[a:b], self.psi[a:b]) for (_, fibres), a, b in zip(parts, ends[:-1], ends[1:])]
+        self._parts = []
+        for (_, fibres), a, b in zip(parts, ends[:-1], ends[1:]):
+            directions = np.empty((b - a, 0, self.lanes)) if fibres is None else _in_tiles(
+                fibres.reshape(len(fibres), -1), self.lanes)
+            loops = GENERAL_FORCES[dim] if fibres is not None else FORCES[0 if plane_stress else dim]
+            self._parts.append(_Part(loops, Elements(self.conn[a:b], self.geometry[a:b], self.gamma[a:b], directions,
+                                                     self._force[a:b], self.W[a:b], self.psi[a:b])))
+        none = np.empty((self.count, 0, self.lanes))
+        self._whole = Elements(self.conn, self.geometry, self.gamma, none, self._force, self.W, self.psi)
         most: int = numba.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]
         self.threads = 1 if space.w.size < self.WORTH else min(threads, most)
         self._faster: dict[object, Faster] = {}
@@ -142,7 +138,7 @@ class Tiles:
         """
         gone = np.ones((self.count, self.lanes), bool)
         gone.reshape(-1)[self._place] = deleted
-        return float(relax(self.conn, nodal, self.space.N, gone, floor, self.geometry, self.W, self.gamma))
+        return float(relax(nodal, self.space.N, gone, floor, self._whole))
 
     def force(self, x: np.ndarray, laws: Sequence[Law], out: np.ndarray, j_bar: bool = True) -> float:
         """Internal force (Eq. 17) at the positions `x` (n, dim) [mm] into `out` (n, dim) [N, or N/mm in 2D].
@@ -152,8 +148,8 @@ class Tiles:
         """
         least = 1.0
         for number, (law, part) in enumerate(zip(laws, self._parts)):
-            least = min(least, *self._share(part.loops, number, *law, part.conn, x, part.geometry, part.gamma,
-                                            *part.fibres, j_bar, part.force, part.W, part.psi))
+            least = min(least, *self._share(part.loops, number, law.psi.address, law.constants,
+                                            Volumetric(law.bulk_modulus, j_bar), x, part.elements))
         _sum_at_nodes(self._force.reshape(-1), self._start, self._offset, self.lanes, out)
         return least
 
@@ -177,13 +173,13 @@ class Tiles:
         `bulk_moduli` are those of the parts; `inverse_mass` (n, dim) is zero where a degree of freedom is held.
         """
         loops = VOLUMETRIC[self.space.dim]
-        return max(k * max(self._share(loops, number, part.conn, x, part.geometry, part.gamma, inverse_mass))
+        return max(k * max(self._share(loops, number, x, part.elements, inverse_mass))
                    for number, (k, part) in enumerate(zip(bulk_moduli, self._parts)))
 
     def plane_stiffness(self, x: np.ndarray, laws: Sequence[Law], inverse_mass: np.ndarray) -> float:
         """What :meth:`volumetric` is, for plane stress, where nothing resists a change of area but shear."""
-        return max(float(stiffness_plane_stress(*law, part.conn, x, part.geometry, part.gamma, inverse_mass))
-                   for law, part in zip(laws, self._parts))
+        return max(float(stiffness_plane_stress(law.psi.address, law.constants, law.bulk_modulus, x, part.elements,
+                                                inverse_mass)) for law, part in zip(laws, self._parts))
 
     def mean_force(self) -> float:
         """Mean magnitude of the forces the elements exert on their nodes, by component, at the last evaluation.

@@ -15,9 +15,10 @@ from .lanes import FAST, LANES, LANES_3D
 
 __all__ = ["volumetric_2d", "volumetric_3d"]
 
+
 @njit(fastmath=FAST)
-def _greatest(conn, b, inverse_mass, w, gamma, sums, greatest):  # type: ignore[no-untyped-def]
-    """The greater of `greatest` and gamma_bar sum_a |V b_a|^2/m_a / V over the lanes; b has the rows dim * a + i."""
+def _greatest(conn, b, inverse_mass, w, gamma, sums):  # type: ignore[no-untyped-def]
+    """The greatest gamma_bar sum_a |V b_a|^2/m_a / V over the lanes; b has the rows dim * a + i."""
     na, lanes = conn.shape
     dim = inverse_mass.shape[1]
     square, V, mean = sums[:lanes], sums[lanes:2 * lanes], sums[2 * lanes:]
@@ -30,6 +31,7 @@ def _greatest(conn, b, inverse_mass, w, gamma, sums, greatest):  # type: ignore[
         for i in range(lanes):
             V[i] += w[a * lanes + i]
             mean[i] += w[a * lanes + i] * gamma[a * lanes + i]
+    greatest = 0.0
     for i in range(lanes):
         value = mean[i] * square[i] / (V[i] * V[i])
         greatest = value if value > greatest else greatest
@@ -37,30 +39,33 @@ def _greatest(conn, b, inverse_mass, w, gamma, sums, greatest):  # type: ignore[
 
 
 @njit(cache=True, fastmath=FAST, nogil=True)
-def volumetric_2d(conn, x, geometry, gamma, inverse_mass):  # type: ignore[no-untyped-def]
+def volumetric_2d(x, elements, inverse_mass):  # type: ignore[no-untyped-def]
+    conn, geometry, gamma = elements.conn, elements.geometry, elements.gamma
     Q = 4 * LANES
-    z, ws, t = np.empty(8 * LANES), np.empty(11 * Q), np.empty(4 * Q)
+    z, ws, t = np.empty(8 * LANES), np.empty(force2d.ROWS * LANES), np.empty(4 * Q)
     ab, b, sums = np.zeros(2 * Q), np.empty(8 * LANES), np.empty(3 * LANES)
     greatest = 0.0
     for tile in range(conn.shape[0]):
-        geo, w = geometry[tile].reshape(-1), geometry[tile].reshape(-1)[4 * Q:]
+        geo, w = geometry[tile].reshape(-1), geometry[tile].reshape(-1)[force2d.WEIGHT * LANES:]
         ab[Q:] = w
         force2d._gather(conn[tile], x, z)
         force2d._kinematics(z, geo, ws)
         force2d._stress(ws, geo, ab, t)
         force2d._nodal_force(t, b)
-        greatest = _greatest(conn[tile], b, inverse_mass, w, gamma[tile].reshape(-1), sums, greatest)
+        found = _greatest(conn[tile], b, inverse_mass, w, gamma[tile].reshape(-1), sums)
+        greatest = found if found > greatest else greatest
     return greatest
 
 
 @njit(cache=True, fastmath=FAST, nogil=True)
-def volumetric_3d(conn, x, geometry, gamma, inverse_mass):  # type: ignore[no-untyped-def]
+def volumetric_3d(x, elements, inverse_mass):  # type: ignore[no-untyped-def]
+    conn, geometry, gamma = elements.conn, elements.geometry, elements.gamma
     L, Q = LANES_3D, 8 * LANES_3D
     z, F, P, t = np.empty(24 * L), np.empty(9 * Q), np.empty(9 * Q), np.empty(4 * Q)
     ab, b, sums = np.zeros(2 * Q), np.empty(24 * L), np.empty(3 * L)
     greatest = 0.0
     for tile in range(conn.shape[0]):
-        geo, w = geometry[tile].reshape(-1), geometry[tile].reshape(-1)[9 * Q:]
+        geo, w = geometry[tile].reshape(-1), geometry[tile].reshape(-1)[force3d.WEIGHT * Q:]
         ab[Q:] = w
         force3d._gather(conn[tile], x, z)
         for c in range(3):
@@ -70,5 +75,6 @@ def volumetric_3d(conn, x, geometry, gamma, inverse_mass):  # type: ignore[no-un
         for c in range(3):
             force3d._pull(P[3 * c * Q:3 * (c + 1) * Q], geo, t)
             force3d._nodal_force(t, b[c * L:])
-        greatest = _greatest(conn[tile], b, inverse_mass, w, gamma[tile].reshape(-1), sums, greatest)
+        found = _greatest(conn[tile], b, inverse_mass, w, gamma[tile].reshape(-1), sums)
+        greatest = found if found > greatest else greatest
     return greatest

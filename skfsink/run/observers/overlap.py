@@ -94,7 +94,7 @@ def _inside(x: np.ndarray, conn: np.ndarray, nodes: np.ndarray, h: float) -> tup
     cell = np.clip(np.floor((points - first) / width), 0, shape - 1).astype(int) @ np.append(1, np.cumprod(shape[:-1]))
     order = np.argsort(cell, kind="stable")
     begin = np.searchsorted(cell[order], np.arange(int(shape.prod()) + 1))
-    pairs = _boxed(x, conn, nodes, order, begin, first, width, shape)
+    pairs = _boxed(x, conn, nodes, _Grid(order, begin, first, width, shape))
     if not len(pairs):
         return pairs[:, 0], pairs[:, 1]
     node, element = nodes[pairs[:, 0]], pairs[:, 1]
@@ -109,12 +109,26 @@ def _inside(x: np.ndarray, conn: np.ndarray, nodes: np.ndarray, h: float) -> tup
     return node[found], element[found]
 
 
+class _Grid(NamedTuple):
+    """Cells of a `width` [mm], `shape` (dim,) of them from `first` (dim,) on.
+
+    Those of the nodes in cell c are `order[begin[c]:begin[c + 1]]`.
+    """
+
+    order: np.ndarray
+    begin: np.ndarray
+    first: np.ndarray
+    width: float
+    shape: np.ndarray
+
+
 @njit(cache=True)
-def _boxed(x, conn, nodes, order, begin, first, width, shape):  # type: ignore[no-untyped-def]
+def _boxed(x, conn, nodes, grid):  # type: ignore[no-untyped-def]
     """Pairs (m, 2) of a place in `nodes` and an element of `conn` whose box holds that node, and which has it not.
 
-    The nodes of cell c are `nodes[order[begin[c]:begin[c + 1]]]`; cells of a `width` begin at `first` (dim,).
+    `grid` is a :class:`_Grid` of the nodes.
     """
+    order, begin, first, width, shape = grid.order, grid.begin, grid.first, grid.width, grid.shape
     na, dim = conn.shape[1], x.shape[1]
     found = np.empty((256, 2), np.int64)
     low, high = np.zeros(dim), np.zeros(dim)

@@ -1,0 +1,76 @@
+"""What the element loops take, by name: numba takes named tuples of arrays and numbers."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...system.jit import njit
+
+__all__ = ["Elements", "Piece", "Solid", "Volumetric", "share"]
+
+
+class Elements(NamedTuple):
+    """Tiles of elements of one material, and what a loop leaves there; all but `psi` are (tiles, rows, lanes).
+
+    Attributes
+    ----------
+    conn: nodes.
+    geometry: d xi/d X by component, then the quadrature weights, each at all Gauss points.
+    gamma: relative density at the Gauss points.
+    fibres: directions, three rows for each family.
+    force: forces on the nodes, by node, then component.
+    W: stored energy density at the Gauss points.
+    psi: gamma-weighted stored energy, (tiles, lanes).
+    """
+
+    conn: np.ndarray
+    geometry: np.ndarray
+    gamma: np.ndarray
+    fibres: np.ndarray
+    force: np.ndarray
+    W: np.ndarray
+    psi: np.ndarray
+
+
+class Volumetric(NamedTuple):
+    """The volumetric part of the stored energy: k [MPa], and whether J is its element mean."""
+
+    bulk_modulus: float
+    j_bar: bool
+
+
+class Solid(NamedTuple):
+    """What a tangent asks of a material besides psi: moduli [MPa], and which tangent is wanted."""
+
+    bulk_modulus: float
+    shear_modulus: float
+    j_bar: bool
+    convex: bool
+
+
+class Piece(NamedTuple):
+    """Elements for the second derivatives, element by element.
+
+    Attributes
+    ----------
+    conn: nodes (ne, na).   dN: Grad N (ne, nq, na, dim).   w, gamma: (ne, nq).   slot: see :class:`.Pattern`.
+    fibres: directions (ne, families, 3).
+    """
+
+    conn: np.ndarray
+    dN: np.ndarray
+    w: np.ndarray
+    gamma: np.ndarray
+    slot: np.ndarray
+    fibres: np.ndarray
+
+
+@njit
+def share(elements, s, shares):  # type: ignore[no-untyped-def]
+    """Share number `s` of `shares`: a run of neighbouring tiles."""
+    n = elements.conn.shape[0]
+    a, b = n * s // shares, n * (s + 1) // shares
+    return Elements(elements.conn[a:b], elements.geometry[a:b], elements.gamma[a:b], elements.fibres[a:b],
+                    elements.force[a:b], elements.W[a:b], elements.psi[a:b])
