@@ -255,9 +255,9 @@ def test_a_changed_form_changes_the_run_and_no_compiled_one(monkeypatch: pytest.
 # --- how a run is asked for it ---
 def test_names_and_sizes_are_checked(monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if a backend that does not exist, or a body that would take days, is taken in silence."""
-    with pytest.raises(ParameterError, match="kernels must be one of compiled, forms.*; got 'gpu'"):
+    with pytest.raises(ParameterError, match=r"kernels must be one of compiled, forms.*; got 'gpu'"):
         Controls(kernels="gpu")
-    with pytest.raises(ParameterError, match="kernels must be one of compiled, forms.*; got 'gpu'"):
+    with pytest.raises(ParameterError, match=r"kernels must be one of compiled, forms.*; got 'gpu'"):
         Momentum(box("quad", 2), AAA(), kernels="gpu")
     monkeypatch.setitem(assembled.MOST, 2, 8)
     BACKENDS["compiled"].check(box("quad", 3))
