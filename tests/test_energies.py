@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bodies import Fracture
-from energies import Energies, Moment, check_sink, stored_moments
+from dissipation import Energies, Moment, check_sink, stored_moments
 from guarded import NOTCHED, scene, simulation
 
 from skfsink.fields.body import Body

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from bodies import Weight, box, ends, notched, wavy
-from energies import Energies
+from dissipation import Energies
 from guarded import NOTCHED, PLAIN, Stop, simulation
 
 from skfsink.errors import ConvergenceError, Interrupted, MeshError, ParameterError

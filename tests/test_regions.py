@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import skfem
 from bodies import Fracture, at_onset, box, close, ends, grid, held_body, momentum_of, notched, patchy, wavy
-from energies import Energies, check_sink
+from dissipation import Energies, check_sink
 from guarded import NOTCHED, Stop, Watched, scene, simulation
 from scipy.optimize import brentq
 from test_material_library import TISSUE, Hoops

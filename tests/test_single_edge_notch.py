@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from energies import check_sink, stored_moments
+from dissipation import check_sink, stored_moments
 
 from skfsink.cases.single_edge_notch import single_edge_notch
 from skfsink.fields.body import Body
