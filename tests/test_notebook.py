@@ -21,7 +21,7 @@ def cells(kind: str) -> list[dict[str, Any]]:
 
 
 @pytest.mark.slow
-def test_the_notebook_runs_from_mesh_to_figure(pictures: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_notebook_runs_from_mesh_to_figure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, pictures: None) -> None:
     """Fails if a cell does not run any more, prints other lines than it shows, or no figure comes out."""
     monkeypatch.chdir(tmp_path)
     source = "\n".join("".join(cell["source"]) for cell in cells("code"))

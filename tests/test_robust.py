@@ -158,7 +158,10 @@ def test_programs_that_are_stopped(number: signal.Signals, mesh: Path, tmp_path:
             (["run", deck, "--out", run, "--quiet"], run / "series/run_0000.vtu", f"go on with skfsink resume {run}"),
             (["sweep", deck, "--vary", "phi=0.16,0.17", "--jobs", "1", "--out", sweep, "--quiet"],
              sweep / "phi=0.16/run/series/run_0000.vtu", "0 of 2 runs done; the same command goes on")):
-        child = subprocess.Popen([sys.executable, "-m", "skfsink", *map(str, arguments)], stderr=subprocess.PIPE,
+        # a shell may have SIGINT ignored
+        heeded = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
+        program = f"{heeded}; from skfsink.__main__ import main; main()"
+        child = subprocess.Popen([sys.executable, "-c", program, *map(str, arguments)], stderr=subprocess.PIPE,
                                  text=True)
         try:
             for _ in range(600):
