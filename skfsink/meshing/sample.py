@@ -154,12 +154,12 @@ def mesh_sample(name: str, mesh: meshio.Mesh) -> Sample:
     return _from_meshio(name, mesh)
 
 
-def shape_sample(case: str, own: Mapping[str, Any], lift: Callable[[meshio.Mesh], meshio.Mesh] | None = None,
+def shape_sample(case: str, arguments: Mapping[str, Any], lift: Callable[[meshio.Mesh], meshio.Mesh] | None = None,
                  settings: Mapping[str, Any] | None = None) -> Sample:
     """The sample of a case whose shape is one of :data:`.shapes.SHAPES`.
 
-    `own` are the arguments of the case function: `mesh`, `mesh_seed`, and the dimensions, named as in the function
-    of the shape; `settings` are arguments of that function which are not those of the named mesh. The committed mesh
+    `arguments` are those of the case function: `mesh`, `mesh_seed`, and the dimensions, named as in the function of the
+    shape; `settings` are arguments of that function which are not those of the named mesh. The committed mesh
     is read where nothing has changed; gmsh makes another one else.
 
     Raises
@@ -169,31 +169,32 @@ def shape_sample(case: str, own: Mapping[str, Any], lift: Callable[[meshio.Mesh]
     MeshError, MissingExtra
         As of :func:`load_sample`.
     """
-    shape, name = SHAPES[case], str(own["mesh"])
-    changed = _changed(case, own, settings or {})
+    shape, name = SHAPES[case], str(arguments["mesh"])
+    changed = _changed(case, arguments, settings or {})
     if not changed:
         return load_sample(case, name, lift=lift)
     if Path(name).suffix:
-        words = [k.replace("_", "-") for k in (*inspect.signature(shape.make).parameters, "mesh_seed") if k in own]
+        names = (*inspect.signature(shape.make).parameters, "mesh_seed")
+        words = [k.replace("_", "-") for k in names if k in arguments]
         raise ParameterError(f"{', '.join(words[:-1])} and {words[-1]} are for the meshes {', '.join(shape.meshes)}; "
                              f"the mesh file {name} is as it is")
     if name not in shape.meshes:
         return load_sample(case, name)  # which says what there is
-    return load_sample(case, name, lambda: shape_mesh(case, own, settings), lift)
+    return load_sample(case, name, lambda: shape_mesh(case, arguments, settings), lift)
 
 
-def shape_mesh(case: str, own: Mapping[str, Any], settings: Mapping[str, Any] | None = None) -> meshio.Mesh:
+def shape_mesh(case: str, arguments: Mapping[str, Any], settings: Mapping[str, Any] | None = None) -> meshio.Mesh:
     """The section of a named mesh with the dimensions, the seed and the settings of :func:`shape_sample`, by gmsh."""
     shape = SHAPES[case]
-    mesh: meshio.Mesh = shape.make(**{**shape.meshes[own["mesh"]], **_changed(case, own, settings or {})})
+    mesh: meshio.Mesh = shape.make(**{**shape.meshes[arguments["mesh"]], **_changed(case, arguments, settings or {})})
     return mesh
 
 
-def _changed(case: str, own: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:
+def _changed(case: str, arguments: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:
     """Arguments of the shape's function that are not those of the committed mesh."""
-    seed = int(require("mesh-seed", own["mesh_seed"], low=0, whole=True))
-    dimensions = {k: own[k] for k, p in inspect.signature(SHAPES[case].make).parameters.items()
-                  if k in own and own[k] != p.default}
+    seed = int(require("mesh-seed", arguments["mesh_seed"], low=0, whole=True))
+    dimensions = {k: arguments[k] for k, p in inspect.signature(SHAPES[case].make).parameters.items()
+                  if k in arguments and arguments[k] != p.default}
     return {**dimensions, **settings, **({"seed": seed} if seed else {})}
 
 
