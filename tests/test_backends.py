@@ -215,6 +215,7 @@ class Stiffened(AssembledMomentum):
         return replace(forms, energy=energy, residual=residual, tangent=tangent)
 
 
+@pytest.mark.slow
 def test_a_changed_form_changes_the_run_and_no_compiled_one(monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if a run does not take a form from the registry, or not its energy, force and tangent.
 

@@ -114,6 +114,7 @@ def test_a_first_pass_without_a_crack_is_refused(tmp_path: Path) -> None:
         single_edge_notch(mesh="coarse", options=options)
 
 
+@pytest.mark.slow
 def test_the_mesh_of_two_passes_comes_from_the_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if a run made again from its scene, or resumed, is not on the mesh that its first pass had laid."""
     pytest.importorskip("gmsh")

@@ -67,6 +67,7 @@ def test_a_half_is_the_part_that_symmetry_leaves(case: str) -> None:
     assert half.speed * half.whole.displacement == pytest.approx(full.speed)
 
 
+@pytest.mark.slow
 def test_a_half_has_the_onset_of_the_whole(tmp_path: Path) -> None:
     """Fails if the rollers hold what symmetry does not, or the factors to the whole are wrong."""
     found = {}

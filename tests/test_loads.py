@@ -349,7 +349,7 @@ def test_sweeps_under_traction_and_grips(tmp_path: Path) -> None:
         simulation(scene(PULL, analysis="quasistatic"), tmp_path / "dead").run()
 
 
-@pytest.mark.parametrize("integrator", ["explicit", "hht"])
+@pytest.mark.parametrize("integrator", ["explicit", pytest.param("hht", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("stop", [3, 40])
 def test_resumed_in_the_middle_of_a_ramp(integrator: str, stop: int, tmp_path: Path) -> None:
     """Fails if a checkpoint misses the place on a ramp: the resumed run writes the same bytes."""

@@ -241,7 +241,7 @@ class Demiray(Material):
         return np.array([self.a, self.b])
 
 
-@pytest.mark.parametrize("kind", ["quad", pytest.param("hex", marks=pytest.mark.slow)])
+@pytest.mark.slow
 def test_a_third_material_is_one_class(space: Space):
     """Fails if a stored energy defined outside the package cannot go through the compiled loops and the forms alike."""
     material = Demiray()

@@ -313,6 +313,7 @@ def run(folder: Path, shape: tuple[int, int], size: tuple[float, float], l: floa
     return found
 
 
+@pytest.mark.slow
 def test_loading_and_unloading_is_a_result(tmp_path: Path, pictures: None) -> None:
     """Fails if a body that does not fail is an error, has no frames, or loads with the wrong sign."""
     summary = run(tmp_path, (10, 2), (5.0, 1.0), 0.5, '[["0 s", 0], ["1 s", "0.3 mm"], ["2 s", 0], ["3 s", "0.4 mm"], '

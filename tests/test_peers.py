@@ -34,7 +34,7 @@ def small(kind: str) -> problems.Problem:
                             np.flatnonzero(X[:, 1] == 0.0), np.array([0.05, 0.1]), tolerance=1e-10)
 
 
-@pytest.mark.parametrize("kind", ["plate", "slab"])
+@pytest.mark.parametrize("kind", ["plate", pytest.param("slab", marks=pytest.mark.slow)])
 def test_reaction_is_that_of_scikit_fem(kind: str) -> None:
     """Fails if the condensed Q1/P0 forms of scikit-fem and the loops of skfsink are not the same element, if a
     tangent is wrong (four iterations a step then do not do), or if skfsink's own Newton method stops elsewhere."""

@@ -218,6 +218,7 @@ def test_the_committed_references_are_small() -> None:
     assert sum(path.stat().st_size for path in files) < 20e6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", COMMITTED, ids=lambda path: f"{path.parts[-4]}-{path.parts[-2]}")
 def test_the_committed_references_can_be_read(path: Path) -> None:
     """Fails if a mesh or the parameters of a case have changed since its reference was computed."""

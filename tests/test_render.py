@@ -70,6 +70,7 @@ def test_without_pyvista_the_extra_is_named(block: Space, monkeypatch: pytest.Mo
         render(block, frame(block), FRONT, box(block), WIDTH)
 
 
+@pytest.mark.slow
 def test_no_run_imports_pyvista() -> None:
     code = ("import sys, skfsink.cases.dog_bone, skfsink.results.reference, skfsink.pictures.render; "
             "sys.exit(any(name in sys.modules for name in ('pyvista', 'vtk', 'vtkmodules')))")
