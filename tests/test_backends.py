@@ -119,6 +119,7 @@ def equal(states: Sequence[State], tolerance: float = 1e-10) -> None:
         assert getattr(two.ledger, name) == pytest.approx(getattr(one.ledger, name), abs=scale), name
 
 
+@pytest.mark.slow
 def test_a_loading_and_200_steps_are_the_same() -> None:
     """Fails if any of it differs by more than 1e-10: statics up to the onset, then 200 explicit steps past it.
 
@@ -162,6 +163,7 @@ def test_a_few_steps_are_the_same(name: str) -> None:
     equal(states)
 
 
+@pytest.mark.slow
 def test_implicit_steps_are_the_same() -> None:
     """Fails if the consistent mass or the residual test of HHT depends on the backend."""
     space, states = notched(9, 1.5, 0.5), []

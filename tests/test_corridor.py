@@ -106,6 +106,7 @@ def test_without_gmsh_the_committed_mesh_is_taken_and_said_so(tmp_path: Path, mo
     assert any("no gmsh" in text for text in json.loads((tmp_path / "run" / "summary.json").read_text())["warnings"])
 
 
+@pytest.mark.slow
 def test_a_first_pass_without_a_crack_is_refused(tmp_path: Path) -> None:
     """Fails if a corridor is laid along nothing."""
     pytest.importorskip("gmsh")

@@ -158,6 +158,7 @@ def around(text: str, pieces: dict[str, str]) -> list[str]:
     return [piece for words, piece in pieces.items() if words in text]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", programs())
 def test_every_block_runs(page: str, place: Path) -> None:
     """Fails if a Python block, one after the other on its page, ends with an error, or what it defines is of no use."""
@@ -316,6 +317,7 @@ def headings(path: Path) -> set[str]:
     return {re.sub(r"[^\w\- ]", "", text.strip().lower()).replace(" ", "-") for text in found}
 
 
+@pytest.mark.slow
 def test_the_page_of_scenes_is_up_to_date() -> None:
     """Fails if docs/scenes.md is not what `python docs/make/scenes.py` writes."""
     assert made("scenes").page() == PAGES["docs/scenes.md"]

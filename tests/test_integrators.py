@@ -40,7 +40,8 @@ def swinging(kind: str, steps: int, integrator: str, alpha: float = 0.0, end: fl
     return state
 
 
-@pytest.mark.parametrize(("integrator", "alpha"), [("explicit", 0.0), ("hht", 0.0), ("hht", -0.05), ("hht", -1 / 3)])
+@pytest.mark.parametrize(("integrator", "alpha"), [("explicit", 0.0), ("hht", 0.0), ("hht", -0.05),
+                                                   pytest.param("hht", -1 / 3, marks=pytest.mark.slow)])
 def test_second_order_in_time(kind: str, integrator: str, alpha: float):
     """Fails if a scheme loses its order: self-convergence of displacement and velocity, 1.9 to 2.1.
 

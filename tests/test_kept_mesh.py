@@ -47,7 +47,8 @@ def test_a_kept_mesh_reads_as_it_was(kind: str, tmp_path: Path) -> None:
     assert origin("M3") == "M3" and mesh_name("a/b.msh") == "b" and origin("a/none.npz") == "a/none.npz"
 
 
-@pytest.mark.parametrize("kind", ["dynamic", pytest.param("both", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["dynamic", "both"])
 def test_a_folder_goes_on_elsewhere_without_its_mesh_file(kind: str, tmp_path: Path,
                                                           monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if a killed run needs the original file, or its old place, to be resumed, shown, reported or run again."""

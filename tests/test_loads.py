@@ -249,7 +249,7 @@ def test_suddenly_loaded_body_swings_about_the_static_solution(integrator: str) 
     assert state.ledger.loads == pytest.approx(-T * swing[-1], rel=1e-9, abs=1e-12 * T * static)
 
 
-@pytest.mark.parametrize("integrator", ["explicit", "hht"])
+@pytest.mark.parametrize("integrator", ["explicit", pytest.param("hht", marks=pytest.mark.slow)])
 def test_plate_torn_by_a_traction_closes_its_ledger(integrator: str) -> None:
     """Fails if an entry of the event's ledger is wrong: dead loads follow a fast ramp with a knot while a crack runs.
 
@@ -350,7 +350,7 @@ def test_sweeps_under_traction_and_grips(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("integrator", ["explicit", pytest.param("hht", marks=pytest.mark.slow)])
-@pytest.mark.parametrize("stop", [3, 40])
+@pytest.mark.parametrize("stop", [3, pytest.param(40, marks=pytest.mark.slow)])
 def test_resumed_in_the_middle_of_a_ramp(integrator: str, stop: int, tmp_path: Path) -> None:
     """Fails if a checkpoint misses the place on a ramp: the resumed run writes the same bytes."""
     quick = Ramp((0.0, 1.0, 3.0, 9.0, 9.0 + 1e-5), (0.0, 0.05, 0.05, 0.65, 0.7))

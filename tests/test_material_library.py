@@ -454,6 +454,7 @@ def test_sides_of_a_pulled_tissue_are_free_and_unequal():
     assert (F[:, 1, 1] < 0.95 * F[:, 2, 2]).all() and np.allclose(np.linalg.det(F), 1, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_command_prints_the_strengths_and_draws(tmp_path, capsys: pytest.CaptureFixture):
     """Fails if `material` does not print the table, ignores a constant, or writes no picture."""
     from skfsink.cli.material import material

@@ -58,7 +58,7 @@ def outcome(kind: str, Q: np.ndarray, folder: Path) -> tuple[dict[str, float], S
             "kinetic": energy["D_sink_kinetic"], "arrival": run.crack.tracker.arrival or 0.0}, state
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", ["dynamic", pytest.param("hht", marks=pytest.mark.slow), "quasistatic"])
 def test_a_run_is_the_same_however_the_body_lies(kind: str, tmp_path_factory: pytest.TempPathFactory,
                                                  monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if anything in a run prefers a direction: U, D and arrival, the displacement and gamma of its end.

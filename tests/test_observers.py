@@ -98,7 +98,7 @@ def test_a_quasistatic_run_counts_passes(tmp_path: Path) -> None:
     assert passes[:-1] == list(range(0, run.state.step, 3))[:len(passes) - 1] and passes[-1] == run.state.step
 
 
-@pytest.mark.parametrize("stop", [3, 60])
+@pytest.mark.parametrize("stop", [pytest.param(3, marks=pytest.mark.slow), 60])
 def test_a_resumed_run_gives_an_observer_back_what_it_kept(stop: int, tmp_path: Path) -> None:
     """Fails if rows of an observer are lost, doubled or altered where a run goes on, in loading or in the event.
 

@@ -60,6 +60,7 @@ def started(program: str, *arguments: object) -> str:
     return ran.stdout
 
 
+@pytest.mark.slow
 def test_every_module_imports() -> None:
     """Fails if a module needs at its import what the system does not have."""
     assert len(started(HIDE + EVERY).split()) > 200

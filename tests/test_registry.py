@@ -49,6 +49,7 @@ print(command_line(load(folder / "run")))
 """
 
 
+@pytest.mark.slow
 def test_a_case_is_one_file(tmp_path: Path) -> None:
     """Fails if the case of CONTRIBUTING.md has to be named anywhere to be listed, shown, swept, run and reported."""
     page = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")

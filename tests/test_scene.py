@@ -39,8 +39,9 @@ def scene(mesh: Path, **options: Any) -> Scene:
     return CASE.scene({**OWN, "mesh": str(mesh)}, Options(**options))
 
 
-@pytest.mark.parametrize("arguments", [["--event-time", "2e-5", "--phi", "0.2"], ["--analysis", "quasistatic"],
-                                       ["--integrator", "hht", "--event-time", "5e-6", "--sink", "nearest"]])
+@pytest.mark.parametrize("arguments", [
+    ["--event-time", "2e-5", "--phi", "0.2"], pytest.param(["--analysis", "quasistatic"], marks=pytest.mark.slow),
+    pytest.param(["--integrator", "hht", "--event-time", "5e-6", "--sink", "nearest"], marks=pytest.mark.slow)])
 def test_scene_file_is_enough_to_run_again(arguments: list[str], mesh: Path, tmp_path: Path,
                                            monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if a parameter that decides the result is missing from scene.toml, or loses a bit in it."""
@@ -135,6 +136,7 @@ def test_fingerprint_of_scenes_made_in_python(mesh: Path) -> None:
     assert {s.fingerprint for s in (base, *same)} == {base.fingerprint}
 
 
+@pytest.mark.slow
 def test_digests_do_not_depend_on_the_process() -> None:
     """Fails if the hash of a value has an address, the order of a set, or the elided text of an array in it."""
     code = ("from skfsink import Options; from skfsink.scene.digest import digest; o = Options(material='hgo');"

@@ -113,6 +113,7 @@ def test_a_name_stands_for_a_deck(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
         deck_path(Path("hole"))
 
 
+@pytest.mark.slow
 def test_commands_take_names(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if `list` leaves a deck out, or `run` and `sweep` do not compute the deck of a name, in its folder."""
     monkeypatch.chdir(tmp_path)
@@ -166,6 +167,7 @@ def test_stress_concentration_of_the_solution() -> None:
     assert exact.moved_by(exact.Hole(1.2).displacement).stretch == pytest.approx(1.2, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_strip_stores_the_energy_of_pure_shear(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if the strip ahead of the cut is not in pure shear, or the arms beside the cut bear load: G is not W H."""
     tearing = beside("pure_shear", "tearing")

@@ -72,7 +72,8 @@ def test_an_added_field_is_copied_and_stored() -> None:
         Aged.restored(arrays, {name: value for name, value in values.items() if name != "visits"})
 
 
-@pytest.mark.parametrize(("analysis", "stop"), [("dynamic", 3), ("dynamic", 60), ("quasistatic", 12)])
+@pytest.mark.parametrize(("analysis", "stop"), [pytest.param("dynamic", 3, marks=pytest.mark.slow), ("dynamic", 60),
+                                                  ("quasistatic", 12)])
 def test_an_added_field_goes_on_with_a_resumed_run(analysis: str, stop: int, tmp_path: Path,
                                                    monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if a field that is added to the state is lost where a run goes on, in the loading, in the event, in passes.

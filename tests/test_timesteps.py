@@ -27,7 +27,7 @@ MAKERS: dict[str, Callable] = {
 
 
 @pytest.mark.parametrize("name", MAKERS)
-@pytest.mark.parametrize("before", [13, 120])
+@pytest.mark.parametrize("before", [13, pytest.param(120, marks=pytest.mark.slow)])
 def test_run_continues_to_the_same_bits(fracture: Fracture, name: str, before: int):
     """Fails if a checkpoint misses anything: state and memory taken between density solves, in a running crack."""
     fresh, momentum, _, free, velocity = fracture

@@ -114,7 +114,7 @@ def _report(source: Path, out: Path, made: meshio.Mesh, sample: Sample, length: 
 
 def _sets(sets: Mapping[str, Any], what: str) -> str:
     """Names of sets with how many are in each."""
-    return ", ".join(f"{name} ({len(own)} {what})" for name, own in sorted(sets.items())) or "none"
+    return ", ".join(f"{name} ({len(members)} {what})" for name, members in sorted(sets.items())) or "none"
 
 
 if __name__ == "__main__":

@@ -52,9 +52,9 @@ def material_from(name: str, constants: Mapping[str, Any] | None = None) -> Mate
     """
     if name not in MATERIALS:
         raise ParameterError(f"material must be one of {', '.join(MATERIALS)}; got {name!r}")
-    kind, given = MATERIALS[name], dict(constants or {})
+    kind, values = MATERIALS[name], dict(constants or {})
     allowed = [field.name for field in fields(kind)]
-    for constant in given:
+    for constant in values:
         if constant not in allowed:
             raise ParameterError(f"{name} has no constant {constant!r}; its constants are {', '.join(allowed)}")
-    return kind(**given)
+    return kind(**values)

@@ -77,13 +77,13 @@ def rest_of(regions: Sequence[Region], n_elements: int) -> np.ndarray:
 def check_lengths(law: SinkLaw, regions: Sequence[Region]) -> None:
     """Refuse regions whose length l or epsilon is not that of the body's `law` (ParameterError)."""
     for region in regions:
-        own = region.sink_law
-        if own.length_scale != law.length_scale:
-            raise ParameterError(f"region {region.name} has the length-scale {own.length_scale:g} mm, the body "
+        sink_law = region.sink_law
+        if sink_law.length_scale != law.length_scale:
+            raise ParameterError(f"region {region.name} has the length-scale {sink_law.length_scale:g} mm, the body "
                                  f"{law.length_scale:g} mm: gamma is one field with one length, give both the same")
-        if own.epsilon != law.epsilon:
-            raise ParameterError(f"region {region.name} has the epsilon {own.epsilon:g}, the body {law.epsilon:g}: "
-                                 f"gamma is one field, give both the same")
+        if sink_law.epsilon != law.epsilon:
+            raise ParameterError(f"region {region.name} has the epsilon {sink_law.epsilon:g}, the body "
+                                 f"{law.epsilon:g}: gamma is one field, give both the same")
 
 
 def divided(n_elements: int, material: Material, sink_law: SinkLaw, regions: Sequence[Region]) -> tuple[Region, ...]:
@@ -131,11 +131,11 @@ class RegionLaw:
 def by_element(n_elements: int, rest: float, regions: Sequence[Region],
                value: Callable[[Region], float]) -> float | np.ndarray:
     """A constant of the materials, `rest` outside of the regions: a number where it is the same in all, else (ne,)."""
-    own = [value(region) for region in regions]
-    if all(number == rest for number in own):
+    numbers = [value(region) for region in regions]
+    if all(number == rest for number in numbers):
         return rest
     values = np.full(n_elements, float(rest))
-    for region, number in zip(regions, own):
+    for region, number in zip(regions, numbers):
         values[region.elements] = number
     return values
 

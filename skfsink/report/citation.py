@@ -44,7 +44,7 @@ def _entries() -> tuple[Mapping[str, Any], ...]:
 def _listed(entry: Mapping[str, Any]) -> str:
     """Authors as in a list of references: "Jabareen, M., and Volokh, K. Y."."""
     *others, last = (author.get("name") or f"{author['family-names']}, " + " ".join(
-        f"{given[0]}." for given in author["given-names"].split()) for author in entry["authors"])
+        f"{name[0]}." for name in author["given-names"].split()) for author in entry["authors"])
     return ", ".join([*others, f"and {last}" if others else last])
 
 

@@ -62,7 +62,8 @@ def _row(name: str, unit: str | Sequence[str], values: Sequence[Any]) -> Row:
     cells = [number(value) for value in values]
     if len(set(units)) == 1:
         return Row(name, units[0], tuple(cells))
-    return Row(name, "", tuple(cell if cell == EMPTY else f"{cell} {own}" for cell, own in zip(cells, units)))
+    return Row(name, "", tuple(cell if cell == EMPTY else f"{cell} {cell_unit}"
+                               for cell, cell_unit in zip(cells, units)))
 
 
 def _table(caption: str, labels: Sequence[str], rows: Sequence[Row]) -> Table:

@@ -110,9 +110,9 @@ class Frames(Sequence[meshio.Mesh]):
             raise OutputError(f"{self.folder.parent} has no frame {key!r}; it has {', '.join(self.moments) or 'none'}")
         number = self.moments[key] if isinstance(key, str) else range(len(self))[key]
         path = self.folder / frame_file(self.name, number)
-        said = io.StringIO()
+        printed = io.StringIO()
         try:
-            with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):  # meshio prints, and exits
+            with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed):  # meshio prints, and exits
                 mesh = meshio.read(path)
         except (Exception, SystemExit):
             raise OutputError(f"{path} is missing or damaged") from None

@@ -224,8 +224,9 @@ class Simulation:
     # --- costs and checkpoints ---
     def cost(self) -> dict[str, Any]:
         """Wall times and counts since the run began, over all its sessions."""
-        own = 0 if self.integrator is None else self.integrator.factorisations
-        factorisations = self.costs.factorisations + self.statics.factorisations + self.density.factorisations + own
+        stepping = 0 if self.integrator is None else self.integrator.factorisations
+        factorisations = (self.costs.factorisations + self.statics.factorisations + self.density.factorisations
+                          + stepping)
         return {"wall": dict(self.costs.wall), "steps": self.costs.steps,
                 "gamma_solves": self.costs.gamma_solves + self.density.solves, "factorisations": factorisations}
 

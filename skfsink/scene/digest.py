@@ -60,19 +60,19 @@ def _pieces(value: Any) -> Iterator[bytes]:
         yield digest({name: getattr(value, name) for name in names}).encode()
 
 
-def _code(thing: Any) -> Iterator[bytes]:
+def _code(subject: Any) -> Iterator[bytes]:
     """Name of a class or function, and what it does if it is not of this package, whose version a checkpoint has."""
-    thing = getattr(thing, "py_func", thing)  # a compiled function
-    yield str(getattr(thing, "__qualname__", type(thing).__qualname__)).encode()
-    if str(getattr(thing, "__module__", "")).partition(".")[0] == "skfsink":
+    subject = getattr(subject, "py_func", subject)  # a compiled function
+    yield str(getattr(subject, "__qualname__", type(subject).__qualname__)).encode()
+    if str(getattr(subject, "__module__", "")).partition(".")[0] == "skfsink":
         return
     try:
-        yield inspect.getsource(thing).encode()
+        yield inspect.getsource(subject).encode()
     except (OSError, TypeError):
-        yield getattr(getattr(thing, "__code__", None), "co_code", b"")
-    if isinstance(thing, type):  # the compiled law of a material, which stands outside of its class
-        law = getattr(thing, "law", None)
+        yield getattr(getattr(subject, "__code__", None), "co_code", b"")
+    if isinstance(subject, type):  # the compiled law of a material, which stands outside of its class
+        law = getattr(subject, "law", None)
         yield b"" if law is None else digest(law).encode()
-        for base in thing.__mro__[1:]:
+        for base in subject.__mro__[1:]:
             if base is not object:
                 yield digest(base).encode()

@@ -265,8 +265,8 @@ class Options:
         if stiff and "c1" in changed:
             raise ParameterError(f"c1 {self.c1!r} MPa and the {min(stiff)} of the constants say the same: give one of "
                                  f"them")
-        own = {"c2": require("c2", self.c2, "MPa"), **({} if stiff else {"c1": require("c1", self.c1, "MPa")})}
-        return ", ".join([*(f"{name} = {value!r} MPa" for name, value in own.items()), self.constants])
+        moduli = {"c2": require("c2", self.c2, "MPa"), **({} if stiff else {"c1": require("c1", self.c1, "MPa")})}
+        return ", ".join([*(f"{name} = {value!r} MPa" for name, value in moduli.items()), self.constants])
 
     def sink_law(self) -> SinkLaw:
         """The sink and flux laws."""

@@ -74,9 +74,9 @@ class StoredScene:
         """Its text."""
         parameters = {k: v.item() if isinstance(v, np.generic) else v for k, v in self.parameters.items()}
         source = {"source": self.source} if self.source else {}
-        choice = {"choice": dict(self.model_choice)} if self.model_choice else {}
+        choice_table = {"choice": dict(self.model_choice)} if self.model_choice else {}
         return HEAD + tomli_w.dumps({"case": self.case, **source, **tables_beside(parameters),
-                                     "assumed": list(self.assumed), **choice})
+                                     "assumed": list(self.assumed), **choice_table})
 
     def parameters_in(self, folder: Path) -> dict[str, Any]:
         """The parameters, with the path of the mesh file that the run in this folder is computed on."""

@@ -82,8 +82,8 @@ def read_units(folders: Sequence[Path]) -> dict[str, str]:
     def unit(column: str) -> str:
         return f"{plane[column]}, in space {space[column]}" if len(dims) == 2 else history_units(*dims)[column]
 
-    own = {"load": unit("reaction_N_per_mm"), "energy": unit("elastic")}
-    return {name: own.get(kind, kind) for name, kind, _ in FIGURES}
+    units = {"load": unit("reaction_N_per_mm"), "energy": unit("elastic")}
+    return {name: units.get(kind, kind) for name, kind, _ in FIGURES}
 
 
 def _units(run: Path) -> dict[str, str]:

@@ -160,8 +160,8 @@ class Tiles:
             return [float(single(*arguments))]
         numba.set_num_threads(self.threads)
         results = np.empty(self.threads)
-        choice = self._faster.setdefault((single, part), Faster())
-        with choice as several:
+        faster = self._faster.setdefault((single, part), Faster())
+        with faster as several:
             if not several:
                 return [float(single(*arguments))]
             shared(*arguments, results)

@@ -100,12 +100,12 @@ class Observers:
         Two have the same name, or one has that of another class.
     """
 
-    def __init__(self, standard: Sequence[Observer], own: Sequence[Observer] = ()) -> None:
-        names = [observer.name for observer in own]
+    def __init__(self, standard: Sequence[Observer], users: Sequence[Observer] = ()) -> None:
+        names = [observer.name for observer in users]
         if twice := next((name for name in names if names.count(name) > 1), None):
             raise ParameterError(f"two observers are called {twice}: give one of them another `name`")
         by_name = {observer.name: observer for observer in standard}
-        for observer in own:
+        for observer in users:
             there = by_name.get(observer.name)
             if there is not None and not isinstance(observer, type(there)):
                 raise ParameterError(f"the observer {observer.name} would take the place of one of the run, and is not "

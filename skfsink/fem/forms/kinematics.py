@@ -1,0 +1,81 @@
+"""Deformation at the Gauss points of an assembly, found once for all its test functions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import wraps
+from typing import Any, NamedTuple
+
+import numpy as np
+from skfem.helpers import ddot
+
+from ...material.general import cofactor
+from ..kernels.lanes import J_FLOOR
+
+__all__ = ["Derivatives", "Kinematics", "element_mean", "kinematics", "once", "volume_derivatives"]
+
+
+def element_mean(values: Any, dV: Any) -> np.ndarray:
+    """Projection of Gauss point values (..., ne, nq) on the element constants, at every Gauss point (Eq. 13)."""
+    mean = np.sum(values * dV, axis=-1, keepdims=True) / np.sum(np.asarray(dV), axis=-1, keepdims=True)
+    return np.broadcast_to(mean, np.broadcast(values, dV).shape)
+
+
+def once(function: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """A function of the fields of an assembly, evaluated once for all its test functions."""
+    @wraps(function)
+    def kept(w: Any) -> Any:
+        if kept not in w:
+            w[kept] = function(w)
+        return w[kept]
+
+    return kept
+
+
+class Kinematics(NamedTuple):
+    """Deformation at the Gauss points; vectors and tensors come first in the shape.
+
+    Attributes
+    ----------
+    F, F_invT: deformation gradient and F^-T with J not below `J_FLOOR`, (dim, dim, ne, nq).
+    cofactor: J F^-T.
+    full: F with F_33 = 1 in a plane, (ne, nq, 3, 3).
+    J, J_safe: det F, and not below `J_FLOOR`.
+    tr_C: F : F, in three dimensions.
+    """
+
+    F: np.ndarray
+    F_invT: np.ndarray
+    cofactor: np.ndarray
+    full: np.ndarray
+    J: np.ndarray
+    J_safe: np.ndarray
+    tr_C: np.ndarray
+
+
+@once
+def kinematics(w: Any) -> Kinematics:
+    H = np.moveaxis(w["displacement"].grad, (0, 1), (-2, -1))
+    dim = H.shape[-1]
+    F = np.broadcast_to(np.eye(3), (*H.shape[:-2], 3, 3)).copy()
+    F[..., :dim, :dim] += H
+    J = np.linalg.det(F)
+    J_safe = np.maximum(J, J_FLOOR)
+    plain = np.moveaxis(F[..., :dim, :dim], (-2, -1), (0, 1))
+    cof = np.moveaxis(cofactor(F)[..., :dim, :dim], (-2, -1), (0, 1))
+    return Kinematics(plain, cof / J_safe, cof, F, J, J_safe, np.einsum("...iJ,...iJ", F, F))
+
+
+class Derivatives(NamedTuple):
+    """The first derivatives of the volume ratio along two directions, and the second one: J' a, J' b, J'' a b."""
+
+    a: np.ndarray
+    b: np.ndarray
+    both: np.ndarray
+
+
+def volume_derivatives(a: np.ndarray, b: np.ndarray, w: Any) -> Derivatives:
+    """Derivatives of J over J, along the displacement gradients `a` and `b`: spatial divergences, and their product."""
+    G = kinematics(w).F_invT
+    div_a, div_b = ddot(G, a), ddot(G, b)
+    return Derivatives(div_a, div_b, div_a * div_b - np.einsum("iL...,kJ...,kL...,iJ...->...", G, G, a, b))
