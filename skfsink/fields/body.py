@@ -2,19 +2,80 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Protocol
 
 import numpy as np
 
 from ..errors import ParameterError
 from ..fem.space import Space
 from ..loads.schedule import Loading
+from ..material import Material, SinkLaw
+from ..material.regions import Region
 from .density import DensitySolver
 from .momentum import Momentum
 from .state import State
 
-__all__ = ["Body"]
+__all__ = ["Body", "BodyControls", "BodyScene"]
+
+
+class BodyControls(Protocol):
+    """What the balances ask of the options of a scene; see :class:`.Controls`."""
+
+    @property
+    def element(self) -> str:
+        """Name in :data:`.ELEMENTS`."""
+
+    @property
+    def kernels(self) -> str:
+        """Name in :data:`.BACKENDS`."""
+
+    @property
+    def sink(self) -> str:
+        """Name in :data:`.SINKS`."""
+
+    @property
+    def active_zone(self) -> bool:
+        """Whether gamma is solved for only where it changes."""
+
+    @property
+    def force_floor(self) -> float:
+        """Gamma below which a Gauss point exerts no force."""
+
+    @property
+    def deletion(self) -> float:
+        """Gamma at which an element fails."""
+
+    def workers(self, dim: int) -> int:
+        """Threads for a body of that dimension."""
+
+
+class BodyScene(Protocol):
+    """What a body is made from: a :class:`.Scene`, of which this package asks no more."""
+
+    @property
+    def space(self) -> Space:
+        """The spaces."""
+
+    @property
+    def material(self) -> Material:
+        """Stored energy of the elements that are in no region."""
+
+    @property
+    def sink_law(self) -> SinkLaw:
+        """Their sink."""
+
+    @property
+    def regions(self) -> Sequence[Region]:
+        """Elements of other materials."""
+
+    @property
+    def controls(self) -> BodyControls:
+        """Options."""
+
+    def loading(self) -> Loading:
+        """What is held, moved and pulled."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,9 +108,9 @@ class Body:
             raise ParameterError("the momentum balance has other dead loads than the loading: give it `loading.dead`")
 
     @classmethod
-    def of(cls, scene: Any) -> Body:
+    def of(cls, scene: BodyScene) -> Body:
         """The body of a :class:`.Scene`."""
-        controls, space, loading = scene.controls, scene.sample.space, scene.loading()
+        controls, space, loading = scene.controls, scene.space, scene.loading()
         threads = controls.workers(space.dim)
         momentum = Momentum(space, scene.material, controls.element, controls.force_floor, threads,
                             regions=scene.regions, dead=loading.dead, kernels=controls.kernels)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 from ..errors import ParameterError, require
 
-__all__ = ["COUPLINGS", "MASSES", "ExplicitControls", "HHTControls", "StaticsControls"]
+__all__ = ["COUPLINGS", "MASSES", "EventControls", "ExplicitControls", "HHTControls", "StaticsControls"]
 
 COUPLINGS = ("iterated", "single")
 MASSES = ("lumped", "consistent")
@@ -129,3 +130,15 @@ class StaticsControls:
         require("onset-tolerance", self.onset_tolerance, low=0, high=0.1, low_open=True)
         require("max-newton", self.max_newton, low=3, whole=True)
         require("max-passes", self.max_passes, low=3, whole=True)
+
+
+class EventControls(Protocol):
+    """What an integrator asks of the options of a scene; see :class:`.Controls`."""
+
+    @property
+    def explicit(self) -> ExplicitControls:
+        """Options of the explicit integrator."""
+
+    @property
+    def hht(self) -> HHTControls:
+        """Options of the implicit one."""

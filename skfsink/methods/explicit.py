@@ -20,7 +20,6 @@ the change of stored energy at fixed gamma, less the last term: that is what the
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 
@@ -32,7 +31,7 @@ from ..fields.deletion import delete_failed, left_in
 from ..fields.density import Density
 from ..fields.state import State
 from ..system.jit import njit
-from .controls import ExplicitControls
+from .controls import EventControls, ExplicitControls
 from .frequency import highest_frequency
 
 __all__ = ["Explicit"]
@@ -86,7 +85,7 @@ class Explicit:
         self._zones: tuple[Zone, ...] = ()
 
     @classmethod
-    def of(cls, body: Body, controls: Any) -> Explicit:
+    def of(cls, body: Body, controls: EventControls) -> Explicit:
         """The integrator of a body, with its options among the :class:`.Controls`."""
         return cls(body, controls.explicit)
 

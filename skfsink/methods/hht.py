@@ -18,7 +18,6 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 
@@ -27,7 +26,7 @@ from ..fields.body import Body
 from ..fields.deletion import delete_failed
 from ..fields.density import Density
 from ..fields.state import State
-from .controls import HHTControls
+from .controls import EventControls, HHTControls
 from .hht_ledger import Balance, book_motion, book_sink
 from .hht_trial import Scheme, Trial
 
@@ -73,7 +72,7 @@ class HHT:
         self._cut = False  # whether a step was cut because a crack ran through it
 
     @classmethod
-    def of(cls, body: Body, controls: Any) -> HHT:
+    def of(cls, body: Body, controls: EventControls) -> HHT:
         """The integrator of a body, with its options among the :class:`.Controls`."""
         return cls(body, controls.hht)
 

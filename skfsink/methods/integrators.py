@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from ..fields.body import Body
 from ..fields.state import State
+from .controls import EventControls
 from .explicit import Explicit
 from .hht import HHT
 
@@ -19,7 +20,7 @@ class Integrator(Protocol):
     """What a run asks of an integrator: it advances a :class:`.State` in place."""
 
     @classmethod
-    def of(cls, body: Body, controls: Any) -> Integrator:
+    def of(cls, body: Body, controls: EventControls) -> Integrator:
         """The integrator of a body; `controls` are the :class:`.Controls` of its scene."""
         raise NotImplementedError
 

@@ -96,6 +96,11 @@ class Scene:
                                  "take start onset")
 
     @property
+    def space(self) -> Space:
+        """The spaces of the sample."""
+        return self.sample.space
+
+    @property
     def parts(self) -> tuple[Region, ...]:
         """The body by its materials: what is in no region first, with an empty name, if there is any."""
         return divided(self.sample.space.n_elements, self.material, self.sink_law, self.regions)
