@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from ..errors import OutputError, ParameterError
+from ..errors import MeshError, OutputError, ParameterError
 from ..meshing.kept_mesh import mesh_name, origin
 from ..meshing.outline import has_gmsh
 from ..scene.case import Case, shared_parameters
-from ..scene.options import NOT_PHYSICS, Options
+from ..scene.options import NOT_PHYSICS, Options, check_options
 from ..scene.scene import Scene
 from ..scene.stored import SCENE, StoredScene, corridor_mesh, kept_mesh
 from .model import AUTO, choose_model
@@ -66,9 +67,14 @@ def read_request(case: Case, arguments: dict[str, Any], options: Options) -> Run
         A model, or something else than the run to go on with, was asked for that cannot be.
     OutputError
         There is no run to go on with, or no measured model.
+    MeshError
+        The mesh is neither a name nor a path.
     """
-    if Path(arguments["mesh"]).suffix:  # a file: the run may be resumed from another folder
-        arguments = {**arguments, "mesh": str(Path(arguments["mesh"]).absolute())}
+    check_options(options)
+    if not isinstance(mesh := arguments["mesh"], str | os.PathLike):
+        raise MeshError(f"mesh must be the name of a mesh, or the path of a mesh file; got {mesh!r:.80}")
+    # a file by its whole path: the run may be resumed from another folder
+    arguments = {**arguments, "mesh": str(Path(mesh).absolute() if Path(mesh).suffix else mesh)}
     if options.resume is not None:
         request = _resumed(RunRequest(case, arguments, options), options.resume)
     elif options.model:
