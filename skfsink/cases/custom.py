@@ -14,8 +14,9 @@ from ..material.regions import Region, RegionLaw
 from ..meshing.sample import file_sample
 from ..results.result import Result
 from ..run.compute import run_case
+from ..run.request import check_options
 from ..scene.case import Case
-from ..scene.options import SAMPLE, Options, check_options
+from ..scene.options import SAMPLE, Options
 from ..scene.scene import Scene
 from ..scene.tables import grips_of, read_tables, regions_of, tractions_of
 from ..units import Unit

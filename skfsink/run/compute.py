@@ -128,8 +128,8 @@ def _copied(observers: Sequence[Observer]) -> tuple[Observer, ...]:
         try:
             copies.append(deepcopy(observer, shared))
         except Exception as error:  # whatever an attribute raises
-            raise ParameterError(f"the observer {observer.name} cannot be copied ({first_line(error)}), and each run of "
-                                 f"analysis both gets a copy: open files and the like in its `prepare`") from None
+            raise ParameterError(f"the observer {observer.name} cannot be copied ({first_line(error)}), and each run "
+                                 f"of analysis both gets a copy: open files and the like in its `prepare`") from None
     return tuple(copies)
 
 

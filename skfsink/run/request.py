@@ -12,12 +12,12 @@ from ..errors import MeshError, OutputError, ParameterError
 from ..meshing.kept_mesh import mesh_name, origin
 from ..meshing.outline import has_gmsh
 from ..scene.case import Case, shared_parameters
-from ..scene.options import NOT_PHYSICS, Options, check_options
+from ..scene.options import NOT_PHYSICS, Options
 from ..scene.scene import Scene
 from ..scene.stored import SCENE, StoredScene, corridor_mesh, kept_mesh
 from .model import AUTO, choose_model
 
-__all__ = ["RunRequest", "read_request"]
+__all__ = ["RunRequest", "check_options", "read_request"]
 
 
 @dataclass(frozen=True)
@@ -56,6 +56,20 @@ class RunRequest:
     def scene(self) -> Scene:
         """The scene, with its mesh."""
         return replace(self.case.scene(self.arguments, self.options), model_choice=self.model_choice)
+
+
+def check_options(options: Any) -> Options:
+    """What a case function was given as its `options`.
+
+    Raises
+    ------
+    ParameterError
+        It is something else than :class:`Options`.
+    """
+    if not isinstance(options, Options):
+        cure = "Options(**{...})" if isinstance(options, dict) else "Options(...), or leave them out"
+        raise ParameterError(f"options must be skfsink.Options; got {options!r:.80}: give {cure}")
+    return options
 
 
 def read_request(case: Case, arguments: dict[str, Any], options: Options) -> RunRequest:

@@ -23,12 +23,12 @@ from ..material import (
     own_constants,
 )
 from ..methods.controls import ExplicitControls, HHTControls, StaticsControls
-from ..units import Unit
 from ..system.files import path_of
+from ..units import Unit
 from .controls import Controls, choose
 from .schedule import check_observers
 
-__all__ = ["LAYOUTS", "NOT_PHYSICS", "OUTSIDE_A_DECK", "QUANTITIES", "SAMPLE", "Options", "check_options"]
+__all__ = ["LAYOUTS", "NOT_PHYSICS", "OUTSIDE_A_DECK", "QUANTITIES", "SAMPLE", "Options"]
 
 #: options that say where a run goes, or are set by the run itself
 OUTSIDE_A_DECK = ("out", "resume", "overwrite", "quiet", "observers", "corridor", "kept_mesh", "given_names")
@@ -301,17 +301,3 @@ class Options:
             if isinstance(material, AAA):
                 chosen |= {"c1": material.c1, "constants": ""}
         return {**chosen, "phi": self.sink_law().phi}
-
-
-def check_options(options: Any) -> Options:
-    """What a case function was given as its `options`.
-
-    Raises
-    ------
-    ParameterError
-        It is something else than :class:`Options`.
-    """
-    if not isinstance(options, Options):
-        cure = "Options(**{...})" if isinstance(options, dict) else "Options(...), or leave them out"
-        raise ParameterError(f"options must be skfsink.Options; got {options!r:.80}: give {cure}")
-    return options
