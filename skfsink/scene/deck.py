@@ -71,7 +71,8 @@ class Deck:
             There is no such case, no such parameter, or it has no such value.
         """
         case = find_case(self.case)
-        arguments, values = case.divide(case.read(self.parameters))
+        named = {name: str(value) if isinstance(value, Path) else value for name, value in self.parameters.items()}
+        arguments, values = case.divide(case.read(named))
         return arguments, replace(Options(), **values, given_names=frozenset(self.parameters))
 
     def toml(self) -> str:
