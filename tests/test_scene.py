@@ -202,7 +202,8 @@ def test_numbers_from_numpy_and_python_write_the_same_scene(mesh: Path) -> None:
     values = {"phi": np.float64(0.2), "gamma_every": np.int64(3), "c1": np.float32(0.5)}
     plain = {"phi": 0.2, "gamma_every": 3, "c1": 0.5}
     assert scene(mesh, **values).stored().toml() == scene(mesh, **plain).stored().toml()
-    decks = [Deck("single_edge_notch", {"mesh": "coarse", **these}).scene().stored().toml() for these in (values, plain)]
+    decks = [Deck("single_edge_notch", {"mesh": "coarse", **those}).scene().stored().toml()
+             for those in (values, plain)]
     assert decks[0] == decks[1]
 
 
