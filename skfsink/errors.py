@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable
 
 __all__ = ["CheckpointError", "ConvergenceError", "InstabilityError", "Interrupted", "MeshError", "MissingExtra",
-           "OutputError", "ParameterError", "SkfsinkError", "place_text", "require"]
+           "OutputError", "ParameterError", "SkfsinkError", "first_line", "place_text", "require"]
 
 
 class SkfsinkError(Exception):
@@ -67,6 +67,11 @@ def require(name: str, value: float, unit: str = "", *, low: float = -math.inf, 
     if not math.isfinite(number) or too_low or too_high or (whole and number % 1):
         raise ParameterError(f"{allowed}; got {value!r}")
     return number
+
+
+def first_line(error: BaseException) -> str:
+    """What an error says, on one line; the name of its class where it says nothing."""
+    return str(error).splitlines()[0] if str(error) else type(error).__name__
 
 
 def place_text(x: Iterable[float]) -> str:

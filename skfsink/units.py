@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from functools import cache
+from numbers import Real
 from typing import Annotated, Any, get_args, get_origin
 
 from .errors import ParameterError
@@ -88,7 +89,7 @@ def number_in(name: str, value: Any, unit: str) -> Any:
     """
     if isinstance(value, str):
         return in_unit(name, value, unit)
-    if isinstance(value, bool) or not isinstance(value, int | float):
+    if isinstance(value, bool) or not isinstance(value, Real):  # those of numpy too
         also = f", or text with a unit such as '1.5 {unit}'" if unit else ""
         raise ParameterError(f"{name} must be a number{also}; got {value!r:.80}")
     return value

@@ -17,17 +17,21 @@ import pytest
 from bodies import Weight
 from plates import SMALL, invoke, plate
 
+from skfsink.cases.custom import custom
 from skfsink.cases.single_edge_notch import CASE, single_edge_notch
 from skfsink.errors import CheckpointError, MeshError, OutputError, ParameterError, require
 from skfsink.fields.state import State
 from skfsink.loads.grips import Grip, Ramp
-from skfsink.material import NeoHookean, SinkLaw
+from skfsink.material import MATERIALS, NeoHookean, SinkLaw
 from skfsink.material.regions import Region
 from skfsink.meshing.symmetry import Whole
 from skfsink.meshing.vtu import write_mesh
 from skfsink.run.checkpoint import load_state, save_state
+from skfsink.run.compute import run
+from skfsink.scene.deck import Deck, read_deck
 from skfsink.scene.digest import digest
 from skfsink.scene.options import Options
+from skfsink.scene.registry import read_scene
 from skfsink.scene.scene import Scene
 from skfsink.scene.stored import StoredScene
 
@@ -198,6 +202,9 @@ def test_numbers_from_numpy_and_python_write_the_same_scene(mesh: Path) -> None:
     values = {"phi": np.float64(0.2), "gamma_every": np.int64(3), "c1": np.float32(0.5)}
     plain = {"phi": 0.2, "gamma_every": 3, "c1": 0.5}
     assert scene(mesh, **values).stored().toml() == scene(mesh, **plain).stored().toml()
+    decks = [Deck("single_edge_notch", {"mesh": "coarse", **those}).scene().stored().toml()
+             for those in (values, plain)]
+    assert decks[0] == decks[1]
 
 
 def test_scene_files_that_are_none(tmp_path: Path) -> None:
@@ -214,3 +221,58 @@ def test_require_takes_whole_numbers_only(value: Any) -> None:
     with pytest.raises(ParameterError, match=r"^count must be a whole number in \[1, 6\] steps; got "):
         require("count", value, "steps", low=1, high=6, whole=True)
     assert require("count", 6, low=1, high=6, whole=True) == require("count", np.float32(6.0), whole=True) == 6.0
+
+
+# --- what Python is given ---
+DECK = Deck("single_edge_notch", {"mesh": "coarse"})
+
+
+@pytest.mark.parametrize("call, kind, message", [
+    (lambda: single_edge_notch(mesh=None), MeshError, "mesh must be the name of a mesh, or the path .*; got None"),
+    (lambda: single_edge_notch(mesh=3), MeshError, "mesh must be .*; got 3"),
+    (lambda: custom(mesh=None), MeshError, "mesh must be .*; got None"),
+    (lambda: single_edge_notch(options=None), ParameterError, r"options must be skfsink.Options; got None: give Opt"),
+    (lambda: single_edge_notch(options={"phi": 0.1}), ParameterError, r"options must .* give Options\(\*\*\{...\}\)"),
+    (lambda: custom(options=None), ParameterError, "options must be skfsink.Options; got None"),
+    (lambda: run("plate.toml", "out"), ParameterError, r"got 'plate.toml': a deck is run by read_deck\(...\).run"),
+    (lambda: run(DECK, "out"), ParameterError, r"got Deck\(.*: a deck is run by read_deck\(...\).run"),
+    (lambda: run(None, "out"), ParameterError, "run takes a Scene; got None$"),
+    (lambda: run(DECK.scene(), None), ParameterError, "folder must be a path; got None"),
+    (lambda: Deck("custom", {"foo": 1}).scene(), ParameterError, "'foo' is no parameter"),
+    (lambda: Deck("single_edge_notch", {"mesh": 3}).scene(), ParameterError, "mesh must be text; got 3"),
+    (lambda: Deck("single_edge_notch", {"side": "4 s"}).scene(), ParameterError, "side must be"),
+    (lambda: DECK.run(bogus=1), ParameterError, "run of a deck takes out, overwrite, .*; got 'bogus'"),
+    (lambda: read_deck(None), ParameterError, "the path of a deck must be a path; got None"),
+    (lambda: read_scene(None), ParameterError, "folder must be a path; got None"),
+    (lambda: Options(constants={"mu": 1.0}), ParameterError, r"constants must be text, such as 'mu = .*; got \{'mu'"),
+    (lambda: Options(material=["gent"]), ParameterError, r"material must be text; got \['gent'\]"),
+    (lambda: Options(overwrite="no"), ParameterError, "overwrite must be true or false; got 'no'"),
+    (lambda: Options(quiet=1), ParameterError, "quiet must be true or false; got 1"),
+    (lambda: Options(active_zone=1), ParameterError, "active-zone must be true or false; got 1"),
+    (lambda: Options(out=3), ParameterError, "out must be a path; got 3"),
+    (lambda: Options(resume=[]), ParameterError, r"resume must be a path; got \[\]")])
+def test_what_python_is_given_is_checked(call: Any, kind: type[Exception], message: str, tmp_path: Path,
+                                         monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fails if a wrong argument is a traceback or is taken in silence, or leaves a folder."""
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(kind, match=message) as error:
+        call()
+    assert "\n" not in str(error.value) and not [*tmp_path.iterdir()]
+
+
+def test_a_law_without_a_limiter_asks_for_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fails if a law that was entered alone is a KeyError, or cannot be used with a limiter."""
+    monkeypatch.setitem(MATERIALS, "demiray", NeoHookean)
+    with pytest.raises(ParameterError, match="material demiray has no energy limiter of its own: give phi"):
+        Options(material="demiray")
+    assert Options(material="demiray", phi=0.2).sink_law().phi == 0.2
+
+
+def test_paths_are_taken_as_text_is(mesh: Path, tmp_path: Path) -> None:
+    """Fails if a mesh or a folder is a traceback as a Path or as text."""
+    result = single_edge_notch(mesh=mesh, options=Options(length_scale=0.6, event_time=2e-7, quiet=True,
+                                                          out=str(tmp_path / "run")))
+    assert result.scene.parameters["mesh"] == str(mesh)
+    assert read_scene(str(result.folder)).fingerprint == read_scene(result.folder).fingerprint
+    coarse = [read.scene().fingerprint for read in (DECK, Deck("single_edge_notch", {"mesh": Path("coarse")}))]
+    assert coarse[0] == coarse[1]

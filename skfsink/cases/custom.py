@@ -14,6 +14,7 @@ from ..material.regions import Region, RegionLaw
 from ..meshing.sample import file_sample
 from ..results.result import Result
 from ..run.compute import run_case
+from ..run.request import check_options
 from ..scene.case import Case
 from ..scene.options import SAMPLE, Options
 from ..scene.scene import Scene
@@ -68,9 +69,9 @@ def custom(
     Result
         Summary, history and last state; its files are in the output folder.
     """
-    if options.model:
+    if check_options(options).model:
         raise ParameterError(f"model is for the cases of the paper, whose models were measured; got {options.model!r}")
-    arguments = {"mesh": str(mesh), "title": title, "faces": faces, "merge_nodes": merge_nodes,
+    arguments = {"mesh": mesh, "title": title, "faces": faces, "merge_nodes": merge_nodes,
                  "grips": read_tables("grips", grips), "tractions": read_tables("tractions", tractions),
                  "regions": read_tables("regions", regions)}
     return run_case(CASE, arguments, options)

@@ -39,7 +39,7 @@ def material(name: str, /, *, phi: float | None = None, m: float | None = None, 
     from rich.console import Console
 
     from ..errors import ParameterError
-    from ..material import LIMITERS, MATERIALS, MODULI, SinkLaw, material_from, read_constants
+    from ..material import MATERIALS, MODULI, SinkLaw, limiter_of, material_from, read_constants
     from ..material.homogeneous import peaks
 
     if out is not None and out.suffix not in PICTURES:
@@ -51,7 +51,7 @@ def material(name: str, /, *, phi: float | None = None, m: float | None = None, 
             raise ParameterError("bulk-modulus and nu say the same: give one of them")
         found = {**beside, **read_constants(name, ", ".join(f"{key} = {text}" for key, text in found.items()))}
     chosen = material_from(name, {key: _value(text) for key, text in found.items()})
-    limiter = LIMITERS[name]
+    limiter = limiter_of(name)
     law = SinkLaw(phi=limiter.phi if phi is None else phi, m=limiter.m if m is None else m)
     strengths = peaks(chosen, law)
     console = Console(highlight=False)

@@ -15,10 +15,10 @@ from .constants import MODULI, constant_names, constants_text, material_of, own_
 from .fibres import HolzapfelGasserOgden
 from .general import GeneralMaterial, MooneyRivlin
 from .isotropic import AAA, ArrudaBoyce, Gent, NeoHookean, Yeoh
-from .library import LIMITERS, MATERIALS, Limiter, material_from
+from .library import LIMITERS, MATERIALS, Limiter, limiter_of, material_from
 from .sink import SinkLaw
 
 __all__ = ["AAA", "GENERAL_LAW", "LAW", "LIMITERS", "MATERIALS", "MODULI", "ArrudaBoyce", "CompiledLaw",
            "GeneralMaterial", "Gent", "HolzapfelGasserOgden", "Limiter", "Material", "MooneyRivlin", "NeoHookean",
-           "SinkLaw", "Yeoh", "constant_names", "constants_text", "material_from", "material_of", "own_constants",
-           "read_constants"]
+           "SinkLaw", "Yeoh", "constant_names", "constants_text", "limiter_of", "material_from", "material_of",
+           "own_constants", "read_constants"]

@@ -13,7 +13,7 @@ from .general import MooneyRivlin
 from .isotropic import AAA, ArrudaBoyce, Gent, NeoHookean, Yeoh
 from .sink import SinkLaw
 
-__all__ = ["LIMITERS", "MATERIALS", "Limiter", "material_from"]
+__all__ = ["LIMITERS", "MATERIALS", "Limiter", "limiter_of", "material_from"]
 
 MATERIALS: dict[str, type[Material]] = {
     "aaa": AAA, "neo-hookean": NeoHookean, "yeoh": Yeoh, "mooney-rivlin": MooneyRivlin, "gent": Gent,
@@ -40,6 +40,20 @@ LIMITERS: dict[str, Limiter] = {
     "hgo": Limiter(0.027, 10.0, "assumed: strength along the axis of 1.03 MPa, attributed to iliac adventitia in "
                    "Holzapfel, Sommer and Regitnig, J. Biomech. Eng. 126 (2004) 657-665, unverified"),
 }
+
+
+def limiter_of(name: str) -> Limiter:
+    """The limiter that belongs to the default constants of the material called `name`.
+
+    Raises
+    ------
+    ParameterError
+        It has none.
+    """
+    if name not in LIMITERS:
+        raise ParameterError(f"material {name} has no energy limiter of its own: give phi [MPa], or enter one in "
+                             f"skfsink.material.LIMITERS")
+    return LIMITERS[name]
 
 
 def material_from(name: str, constants: Mapping[str, Any] | None = None) -> Material:

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..errors import ParameterError
 from ..units import Unit
-from . import LIMITERS, Material, SinkLaw, material_of, own_constants
+from . import Material, SinkLaw, limiter_of, material_of, own_constants
 
 __all__ = ["Region", "RegionLaw", "by_element", "check_lengths", "divided", "rest_of"]
 
@@ -122,7 +122,7 @@ class RegionLaw:
                 one_bulk_modulus(own_constants(self.material, self.constants)[1], self.bulk_modulus)
             law = material_of(self.material, self.constants, self.bulk_modulus or material.bulk_modulus,
                               self.density or material.density)
-            phi = self.phi or LIMITERS[self.material].phi
+            phi = self.phi or limiter_of(self.material).phi
             return law, SinkLaw(phi, self.m or sink_law.m, sink_law.length_scale, sink_law.epsilon)
         except ParameterError as error:
             raise ParameterError(f"region {self.name}: {error}") from None

@@ -25,6 +25,7 @@ class Result:
     history: columns of `history.csv` as arrays.
     state: the last state.
     parts: for `analysis="both"` the results of the two runs, by analysis; otherwise empty.
+    observers: the user's that looked at this run; the parts have their own copies.
     """
 
     folder: Path
@@ -33,6 +34,7 @@ class Result:
     history: dict[str, np.ndarray]
     state: State
     parts: dict[str, Result]
+    observers: tuple[Any, ...] = ()
 
     @property
     def failed(self) -> bool:

@@ -10,12 +10,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import CheckpointError
+from ..errors import CheckpointError, ParameterError, first_line
 from ..fields.state import State
 from ..system.files import write_atomic
 from ..system.version import __version__
 
-__all__ = ["Stored", "load_checkpoint", "load_state", "save_checkpoint", "save_state"]
+__all__ = ["Stored", "load_checkpoint", "load_state", "save_checkpoint", "save_state", "storable"]
+
+PLAIN = (bool, int, float, str, type(None))  # what JSON gives back as it was, beside lists and dicts
 
 
 class Stored(NamedTuple):
@@ -26,18 +28,60 @@ class Stored(NamedTuple):
 
 
 def save_checkpoint(path: Path, fingerprint: str, state: State, memories: Mapping[str, Mapping[str, Any]]) -> None:
-    """Write the state, and the memories of integrator, observers and others: arrays, and plain values as JSON has."""
+    """Write the state, and the memories of integrator, observers and others: what is :func:`storable`."""
     fields, values = state.stored()
     arrays = {f"state/{name}": value for name, value in fields.items()}
     plain: dict[str, dict[str, Any]] = {}
     for owner, memory in memories.items():
-        plain[owner] = {name: value for name, value in memory.items() if not isinstance(value, np.ndarray)}
-        arrays |= {f"{owner}/{name}": value for name, value in memory.items() if isinstance(value, np.ndarray)}
+        content = storable(owner, memory)
+        plain[owner] = {name: value for name, value in content.items() if not isinstance(value, np.ndarray)}
+        arrays |= {f"{owner}/{name}": value for name, value in content.items() if isinstance(value, np.ndarray)}
     meta = {"version": __version__, "fingerprint": fingerprint, "state": values, "memories": plain}
     arrays["meta"] = np.frombuffer(json.dumps(meta).encode(), np.uint8)
     buffer = io.BytesIO()
     np.savez(buffer, **arrays)  # type: ignore[arg-type]
     write_atomic(path, buffer.getvalue())
+
+
+def storable(owner: str, memory: Mapping[str, Any]) -> dict[str, Any]:
+    """A memory as a checkpoint gives it back: arrays of numbers, and plain values: numbers, text, lists, dicts.
+
+    Numbers of numpy have become plain ones, and tuples lists.
+
+    Raises
+    ------
+    ParameterError
+        Something in it is none of these, or would come back as something else; the line names `owner` and attribute.
+    """
+    content = {}
+    for name, value in memory.items():
+        try:
+            content[name] = value if type(value) is np.ndarray and not value.dtype.hasobject else _plain(value)
+        except (TypeError, RecursionError) as error:
+            what = str(error) if isinstance(error, TypeError) else "lists in lists without end"
+            raise ParameterError(f"the {owner} keeps {name} with {what}, which a checkpoint cannot give back: keep "
+                                 f"numbers, text, lists, dicts whose keys are text, or arrays of numbers (none in "
+                                 f"lists)") from None
+    return content
+
+
+def _plain(value: Any) -> Any:
+    """A value with plain numbers and lists in it; TypeError, which says what, if JSON would lose or change another."""
+    kind = type(value)
+    if kind in PLAIN:
+        return value
+    if kind in (list, tuple):
+        return [_plain(item) for item in value]
+    if kind is dict:
+        if odd := [key for key in value if type(key) is not str]:
+            raise TypeError(f"the key {odd[0]!r:.80} of a dict")
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, np.generic) and type(number := value.item()) in PLAIN:
+        return number
+    if isinstance(value, np.ndarray):
+        raise TypeError("an array of objects" if value.dtype.hasobject else "an array in a list or a dict"
+                        if kind is np.ndarray else f"an array of the class {kind.__name__}")
+    raise TypeError(f"a value of the type {kind.__name__}")
 
 
 def load_checkpoint(path: Path, fingerprint: str) -> Stored:
@@ -56,8 +100,7 @@ def load_checkpoint(path: Path, fingerprint: str) -> Stored:
         meta = json.loads(arrays.pop("meta").tobytes())
         version, found = meta["version"], meta["fingerprint"]
     except Exception as error:
-        first = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise CheckpointError(f"the checkpoint {path} is damaged: {first}") from None
+        raise CheckpointError(f"the checkpoint {path} is damaged: {first_line(error)}") from None
     if version != __version__:
         raise CheckpointError(f"the checkpoint {path} was written by skfsink {version}, this is {__version__}")
     if found != fingerprint:

@@ -13,7 +13,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from ..errors import Interrupted
+from ..errors import CheckpointError, Interrupted, ParameterError, first_line
 from ..fields.state import State
 from ..meshing.kept_mesh import MESH, keep_mesh
 from ..pictures.of_a_run import draw_comparison, draw_run
@@ -21,18 +21,21 @@ from ..results.history import History
 from ..results.result import Result
 from ..results.summary import write_summary
 from ..scene.case import Case
+from ..scene.deck import Deck
 from ..scene.options import Options
 from ..scene.scene import Scene
+from ..scene.schedule import check_observers
 from ..scene.stored import SCENE, corridor_mesh
-from ..system.files import prepare_folder
+from ..system.files import path_of, prepare_folder
 from .checkpoint import load_checkpoint, load_state
 from .checks import refuse
 from .display import Display
 from .memory import check_memory
-from .observers.observer import Observer
+from .observers.observer import Observer, Observers
+from .observers.onset import Strength
 from .occupied import occupied
 from .request import RunRequest, read_request
-from .simulate import Loaded, Simulation
+from .simulate import Loaded, Simulation, standard_observers
 from .summarize import summarize
 from .two_pass import corridor_report, lay_corridor
 
@@ -52,7 +55,7 @@ def run(scene: Scene, folder: str | Path, observers: Sequence[Observer] = (), *,
     scene: what to compute: made from its parts, by :meth:`.Deck.scene`, or read by :func:`.read_scene`.
     folder: where its files go.
     observers: look at the run beside those of every run, or in their place; see :class:`.Observer`. Of two analyses
-        each gets copies of them.
+        each gets copies of them, which are the `observers` of its part of the result.
     resume: go on with the run of this scene in `folder`, which must have had the same observers.
     overwrite: use a folder that is not empty.
     quiet: show no progress.
@@ -64,8 +67,13 @@ def run(scene: Scene, folder: str | Path, observers: Sequence[Observer] = (), *,
     Interrupted
         Ctrl-C or SIGTERM; the same call with `resume` goes on.
     """
+    if not isinstance(scene, Scene):
+        is_deck = isinstance(scene, Deck | str | os.PathLike)
+        raise ParameterError(f"run takes a Scene; got {scene!r:.80}"
+                             + (": a deck is run by read_deck(...).run()" if is_deck else ""))
+    path = path_of("folder", folder)
     with Display(quiet) as display:
-        return _compute(scene, _Job(Path(folder), display, resume, tuple(observers)), overwrite)
+        return _compute(scene, _Job(path, display, resume, check_observers(observers)), overwrite)
 
 
 def run_case(case: Case, arguments: dict[str, Any], options: Options) -> Result:
@@ -87,8 +95,14 @@ def run_case(case: Case, arguments: dict[str, Any], options: Options) -> Result:
             return _compute(request.scene(), job, request.options.overwrite, partial(_with_corridor, request))
     except (Interrupted, KeyboardInterrupt):
         begun = (request.folder / SCENE).exists()
-        raise Interrupted("interrupted; " + (f"go on with skfsink resume {shlex.quote(str(request.folder))}" if begun
-                                             else "nothing was computed yet")) from None
+        raise Interrupted(f"interrupted; {_how_to_go_on(request) if begun else 'nothing was computed yet'}") from None
+
+
+def _how_to_go_on(request: RunRequest) -> str:
+    folder = str(request.folder)
+    if request.options.observers:  # the command line has none
+        return f"go on from Python with resume={folder!r} and the same observers"
+    return f"go on with skfsink resume {shlex.quote(folder)}"
 
 
 @dataclass(frozen=True)
@@ -103,7 +117,20 @@ class _Job:
 
     def part(self, analysis: str, resumes: bool) -> _Job:
         """That of one of both analyses, with observers of its own."""
-        return replace(self, folder=self.folder / analysis, resumes=resumes, observers=deepcopy(self.observers))
+        return replace(self, folder=self.folder / analysis, resumes=resumes, observers=_copied(self.observers))
+
+
+def _copied(observers: Sequence[Observer]) -> tuple[Observer, ...]:
+    """Copies of observers, which share what these share (ParameterError)."""
+    copies: list[Observer] = []
+    shared: dict[int, Any] = {}
+    for observer in observers:
+        try:
+            copies.append(deepcopy(observer, shared))
+        except Exception as error:  # whatever an attribute raises
+            raise ParameterError(f"the observer {observer.name} cannot be copied ({first_line(error)}), and each run "
+                                 f"of analysis both gets a copy: open files and the like in its `prepare`") from None
+    return tuple(copies)
 
 
 def _compute(scene: Scene, job: _Job, overwrite: bool,
@@ -126,7 +153,15 @@ def _compute(scene: Scene, job: _Job, overwrite: bool,
 
 
 def _check(scene: Scene, job: _Job) -> None:
-    """Refuse a scene that does not fit into the memory or, of a new run, cannot be meant; nothing is written yet."""
+    """Refuse what cannot be run, before anything is written: a folder that has no run to go on with, observers, a scene
+    that does not fit into the memory or, of a new run, cannot be meant.
+    """
+    both = scene.controls.analysis == "both"
+    if job.resumes and not (job.folder / SCENE).is_file():
+        raise CheckpointError(f"there is no run to go on with in {job.folder}: it has no {SCENE}")
+    Observers(standard_observers(scene, job.display), job.observers, job.resumes and not both)
+    if both:
+        _copied(job.observers)
     check_memory(scene, job.display)
     if not job.resumes:
         refuse(scene)
@@ -175,7 +210,7 @@ def _run_both(scene: Scene, job: _Job) -> Result:
             _begin(folder / analysis, overwrite=True)
         parts[analysis] = _run_one(part, jobs[analysis], onset)
         if parts[analysis].failed:
-            onset = _onset(folder / "dynamic", scenes["dynamic"].fingerprint)
+            onset = _onset(folder / "dynamic", scenes["dynamic"].fingerprint, job.observers)
     return _combined(scene, job, parts)
 
 
@@ -201,9 +236,11 @@ def _combined(scene: Scene, job: _Job, parts: Mapping[str, Result]) -> Result:
     return Result(folder, scene, summary, first.history, first.state, dict(parts))
 
 
-def _onset(folder: Path, fingerprint: str) -> Loaded:
+def _onset(folder: Path, fingerprint: str, observers: Sequence[Observer]) -> Loaded:
+    """What a run with these observers has left of its loading."""
+    name = next((observer.name for observer in observers if isinstance(observer, Strength)), Strength.__name__)
     memories = load_checkpoint(folder / Simulation.CHECKPOINT, fingerprint).memories
-    return Loaded(load_state(folder / Simulation.ONSET, fingerprint), memories["observer Strength"])
+    return Loaded(load_state(folder / Simulation.ONSET, fingerprint), memories[f"observer {name}"])
 
 
 def _run_one(scene: Scene, job: _Job, onset: Loaded | None = None) -> Result:
@@ -245,4 +282,4 @@ def _finished(simulation: Simulation, state: State, job: _Job) -> Result:
     write_summary(folder / SUMMARY, summary)
     display.update(1.0, str(folder))
     display.say(summary["verdict"])
-    return Result(folder, scene, summary, History.load(folder / "history.csv"), state, {})
+    return Result(folder, scene, summary, History.load(folder / "history.csv"), state, {}, job.observers)

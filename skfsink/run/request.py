@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from ..errors import OutputError, ParameterError
+from ..errors import MeshError, OutputError, ParameterError
 from ..meshing.kept_mesh import mesh_name, origin
 from ..meshing.outline import has_gmsh
 from ..scene.case import Case, shared_parameters
@@ -16,7 +17,7 @@ from ..scene.scene import Scene
 from ..scene.stored import SCENE, StoredScene, corridor_mesh, kept_mesh
 from .model import AUTO, choose_model
 
-__all__ = ["RunRequest", "read_request"]
+__all__ = ["RunRequest", "check_options", "read_request"]
 
 
 @dataclass(frozen=True)
@@ -57,6 +58,20 @@ class RunRequest:
         return replace(self.case.scene(self.arguments, self.options), model_choice=self.model_choice)
 
 
+def check_options(options: Any) -> Options:
+    """What a case function was given as its `options`.
+
+    Raises
+    ------
+    ParameterError
+        It is something else than :class:`Options`.
+    """
+    if not isinstance(options, Options):
+        cure = "Options(**{...})" if isinstance(options, dict) else "Options(...), or leave them out"
+        raise ParameterError(f"options must be skfsink.Options; got {options!r:.80}: give {cure}")
+    return options
+
+
 def read_request(case: Case, arguments: dict[str, Any], options: Options) -> RunRequest:
     """The request that the arguments of a case function and the options make; see :func:`.run_case`.
 
@@ -66,9 +81,14 @@ def read_request(case: Case, arguments: dict[str, Any], options: Options) -> Run
         A model, or something else than the run to go on with, was asked for that cannot be.
     OutputError
         There is no run to go on with, or no measured model.
+    MeshError
+        The mesh is neither a name nor a path.
     """
-    if Path(arguments["mesh"]).suffix:  # a file: the run may be resumed from another folder
-        arguments = {**arguments, "mesh": str(Path(arguments["mesh"]).absolute())}
+    check_options(options)
+    if not isinstance(mesh := arguments["mesh"], str | os.PathLike):
+        raise MeshError(f"mesh must be the name of a mesh, or the path of a mesh file; got {mesh!r:.80}")
+    # a file by its whole path: the run may be resumed from another folder
+    arguments = {**arguments, "mesh": str(Path(mesh).absolute() if Path(mesh).suffix else mesh)}
     if options.resume is not None:
         request = _resumed(RunRequest(case, arguments, options), options.resume)
     elif options.model:

@@ -34,7 +34,7 @@ from .observers.progress import Checkpoint, Progress
 from .observers.range import check_scene
 from .observers.view import View
 
-__all__ = ["Loaded", "Simulation"]
+__all__ = ["Loaded", "Simulation", "standard_observers"]
 
 
 class Loaded(NamedTuple):
@@ -62,6 +62,8 @@ class Simulation:
     ------
     CheckpointError
         The checkpoint to resume from is missing, damaged, or of another scene, version, or other observers.
+    ParameterError
+        The observers cannot be those of a run; see :class:`.Observers`.
     """
 
     PATIENCE = 400.0  # a body that comes from rest in motion may take this many times `event_time` to crack
@@ -88,7 +90,7 @@ class Simulation:
         self._from_rest: LoadingFromRest | None = None
         tracker = tracker_of(scene, self.body)
         self.view = View(scene, folder, self.body, tracker, tracker.nothing(), self.state, save=self._save)
-        self.observers = Observers(_standard(scene, display), observers)
+        self.observers = Observers(standard_observers(scene, display), observers, resume)
         of = self.observers.of
         self.crack, self.guard, self.frames = of(Crack), of(Guard), of(Frames)
         self.onset, self.strength, self.history = of(Onset), of(Strength), of(History)
@@ -145,7 +147,7 @@ class Simulation:
                 return
         else:
             self.state = onset.state.copy()
-            self.strength.open(self.view, onset.strength)
+            self.strength.restore(onset.strength)
             self.observers.loading(self.view.at(self.state, self.body.take(self.state)))
         self.observers.onset(self.view.at(self.state, self.momentum.force(self.state.u)))
         if onset is None:
@@ -252,7 +254,7 @@ class Simulation:
             self.body.take(self.state)
 
 
-def _standard(scene: Scene, display: Display) -> list[Observer]:
+def standard_observers(scene: Scene, display: Display) -> list[Observer]:
     """The observers of every run, in the order in which they look."""
     c = scene.controls
     every = c.record_every

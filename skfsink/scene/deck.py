@@ -14,13 +14,14 @@ A `custom` scene also has tables [[grips]], [[tractions]] and [[regions]] (see :
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
 import tomli_w
 
-from ..errors import ParameterError
+from ..errors import ParameterError, first_line
+from ..system.files import path_of
 from ..system.text import read_toml
 from .options import Options
 from .registry import CASES, find_case
@@ -30,6 +31,7 @@ from .stored import TABLES, tables_beside
 __all__ = ["Deck", "read_deck"]
 
 TOP = ("case", "parameters", "source", "assumed", "choice")  # the last three a run says of itself; a deck may have them
+OUTPUT = ("out", "overwrite", "quiet", "resume", "observers")  # options of a run, which no deck has
 LARGEST = 1_000_000  # bytes
 
 
@@ -43,7 +45,14 @@ class Deck:
     def run(self, **output: Any) -> Any:
         """Run it, to a :class:`.Result`; `output` are options that no deck has: out, overwrite, quiet, resume,
         observers.
+
+        Raises
+        ------
+        SkfsinkError
+            What is wrong with the deck, the folder or the run, in one line.
         """
+        if unknown := output.keys() - {f.name for f in fields(Options)}:
+            raise ParameterError(f"run of a deck takes {', '.join(OUTPUT)}; got {min(unknown)!r}")
         arguments, options = self.check()
         return find_case(self.case).function(**arguments, options=replace(options, **output))
 
@@ -54,8 +63,16 @@ class Deck:
         return case.scene({**case.default_arguments, **arguments}, options)
 
     def check(self) -> tuple[dict[str, Any], Options]:
-        """The arguments of the case function, those of the sample and the options; the latter are checked."""
-        arguments, values = find_case(self.case).divide(self.parameters)
+        """The arguments of the case function, those of the sample and the options; the latter are checked.
+
+        Raises
+        ------
+        ParameterError
+            There is no such case, no such parameter, or it has no such value.
+        """
+        case = find_case(self.case)
+        named = {name: str(value) if isinstance(value, Path) else value for name, value in self.parameters.items()}
+        arguments, values = case.divide(case.read(named))
         return arguments, replace(Options(), **values, given_names=frozenset(self.parameters))
 
     def toml(self) -> str:
@@ -71,7 +88,7 @@ def read_deck(path: str | Path) -> Deck:
     ParameterError
         One line: the file is no deck, or it has a parameter, a unit or a value that cannot be.
     """
-    path = Path(path)
+    path = path_of("the path of a deck", path)
     try:
         if not path.is_file():
             raise ParameterError(f"there is no deck {path}")
@@ -79,8 +96,7 @@ def read_deck(path: str | Path) -> Deck:
             raise ParameterError(f"{path} is no deck: it has more than {LARGEST:,} bytes")
         data = read_toml(path)
     except (OSError, ValueError, RecursionError) as error:
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise ParameterError(f"{path} is no deck: {reason}") from None
+        raise ParameterError(f"{path} is no deck: {first_line(error)}") from None
     try:
         deck = _deck(data)
     except ParameterError as error:

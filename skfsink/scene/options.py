@@ -12,19 +12,21 @@ from cyclopts import Group, Parameter, Token
 from ..errors import ParameterError, require
 from ..material import (
     AAA,
-    LIMITERS,
     MATERIALS,
     MODULI,
     Material,
     SinkLaw,
     constant_names,
     constants_text,
+    limiter_of,
     material_of,
     own_constants,
 )
 from ..methods.controls import ExplicitControls, HHTControls, StaticsControls
+from ..system.files import path_of
 from ..units import Unit
 from .controls import Controls, choose
+from .schedule import check_observers
 
 __all__ = ["LAYOUTS", "NOT_PHYSICS", "OUTSIDE_A_DECK", "QUANTITIES", "SAMPLE", "Options"]
 
@@ -223,15 +225,20 @@ class Options:
 
     def __post_init__(self) -> None:
         for name in ("out", "resume", "corridor", "kept_mesh"):
-            if isinstance(folder := getattr(self, name), str):
-                object.__setattr__(self, name, Path(folder))
+            if (folder := getattr(self, name)) is not None:
+                object.__setattr__(self, name, path_of(name.replace("_", "-"), folder))
+        object.__setattr__(self, "observers", check_observers(self.observers))
+        for f in fields(self):
+            name, value = f.name.replace("_", "-"), getattr(self, f.name)
+            if isinstance(f.default, bool) and not isinstance(value, bool):
+                raise ParameterError(f"{name} must be true or false; got {value!r:.80}")
+            if isinstance(f.default, str) and not isinstance(value, str):
+                also = ", such as 'mu = 0.27 MPa, limit = 76.5'" if f.name == "constants" else ""
+                raise ParameterError(f"{name} must be text{also}; got {value!r:.80}")
         require("speed", self.speed, "mm/s", low=0, low_open=True)
         require("tolerance", self.tolerance, low=0, low_open=True)
         choose("quantity", self.quantity, QUANTITIES)
         choose("mesh-layout", self.mesh_layout, LAYOUTS)
-        for name in ("half", "active_zone"):
-            if not isinstance(getattr(self, name), bool):
-                raise ParameterError(f"{name.replace('_', '-')} must be true or false; got {getattr(self, name)!r}")
         if self.dimensions not in (0, 2, 3):
             raise ParameterError(f"dimensions must be 2, 3, or 0 for those of the sample; got {self.dimensions!r}")
         self.stored_energy(), self.sink_law(), self.controls()
@@ -270,7 +277,7 @@ class Options:
 
     def sink_law(self) -> SinkLaw:
         """The sink and flux laws."""
-        return SinkLaw(LIMITERS[self.material].phi if self.phi == 0 else self.phi, self.m, self.length_scale)
+        return SinkLaw(limiter_of(self.material).phi if self.phi == 0 else self.phi, self.m, self.length_scale)
 
     def controls(self) -> Controls:
         """How to compute."""

@@ -13,6 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from ..errors import OutputError, ParameterError
+from ..system.files import path_of
 from .case import Case
 from .options import Options
 from .scene import Scene
@@ -52,7 +53,7 @@ def find_case_of_run(stored: StoredScene, folder: Path) -> Case:
     return find_case(stored.case)
 
 
-def read_scene(folder: Path) -> Scene:
+def read_scene(folder: str | Path) -> Scene:
     """The scene of a run, made again from its `scene.toml`; options that this does not name have their defaults.
 
     Raises
@@ -60,6 +61,7 @@ def read_scene(folder: Path) -> Scene:
     OutputError
         The folder holds no readable scene, or one of a case or with a parameter that do not exist.
     """
+    folder = path_of("folder", folder)
     stored = StoredScene.read(folder)
     case = find_case_of_run(stored, folder)
     try:

@@ -8,11 +8,24 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from ..errors import OutputError
+from ..errors import OutputError, ParameterError
 
-__all__ = ["HIDDEN", "prepare_folder", "replaced", "reported", "write_atomic"]
+__all__ = ["HIDDEN", "path_of", "prepare_folder", "replaced", "reported", "write_atomic"]
 
 HIDDEN = (".lock", ".running")  # files of the lock of a run; a folder that has no others counts as empty
+
+
+def path_of(name: str, value: object) -> Path:
+    """A path, of a Path or a text; `name` says in the error what it is of.
+
+    Raises
+    ------
+    ParameterError
+        It is neither.
+    """
+    if not isinstance(value, str | os.PathLike):
+        raise ParameterError(f"{name} must be a path; got {value!r:.80}")
+    return Path(value)
 
 
 @contextmanager

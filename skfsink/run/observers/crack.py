@@ -28,6 +28,9 @@ def tracker_of(scene: Scene, body: Body) -> CrackTracker:
 class Crack(Observer):
     """Marks what cracks in each step, finds the tips at each record, and says which moments come with them.
 
+    It looks before all other observers and provides for them what they find in the :class:`.View`: `tips`, `moment`,
+    and `waiting`, by which they look more rarely until something has cracked.
+
     Memory: the crack so far.
 
     Attributes

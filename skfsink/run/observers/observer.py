@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, ClassVar, TypeVar
+from typing import Any, TypeVar
 
 from ...errors import CheckpointError, ParameterError
+from ...scene.schedule import Schedule, check_observers
+from ..checkpoint import storable
 from .view import View
 
 __all__ = ["Observer", "Observers"]
@@ -13,38 +15,35 @@ __all__ = ["Observer", "Observers"]
 Kind = TypeVar("Kind", bound="Observer")
 
 
-class Observer:
+class Observer(Schedule):
     """Base of all observers: one derives from it and overrides `look`, and what else is needed.
 
     Calls come in this order: `open` when the run begins or goes on, and `prepare`; `loading` after every load
     increment; `onset` where the loading has ended in a failure; then, in the event, `begin`, `look` at its first
     state, `look` after every step in which it is :meth:`due`, `pause` between two steps, `look` at its last state,
     `finish`; at last `close`, however the run has ended. A run that ends without a failure has no event: `unfailed`
-    takes its place.
+    takes its place. In each call the standard observers come first, :class:`.Crack` before all others, then a user's in
+    the order in which they were given; one that takes the place of a standard one comes in its place.
+
+    An observer belongs to one run; that run may be resumed with it, another needs a new one.
 
     Memory: that of its class, which the hooks `open`, `prepare`, `loading`, `onset`, `unfailed`, `begin`, `due`,
     `look`, `pause`, `finish` and `close` build up in the order above; `kept` names the attributes of which a
-    checkpoint needs the values, `memory` gives them.
+    checkpoint needs the values, `memory` gives them, `restore` takes them up.
 
     Attributes
     ----------
     every: time between two looks [s]; None looks after every step.
     every_passes: the same in a quasi-static event, which has no time.
+    kept: names of the attributes that a checkpoint keeps; see :func:`.storable` for what they may be.
     """
 
-    every: float | None = None
-    every_passes: int = 1
-    kept: ClassVar[tuple[str, ...]] = ()
-
-    @property
-    def name(self) -> str:
-        """What a checkpoint calls it."""
-        return type(self).__name__
+    _used = False  #: whether a run has opened it
 
     def open(self, view: View, memory: Mapping[str, Any] | None = None) -> None:
         """The run begins, or goes on from the `memory` that a checkpoint has; nothing may be written yet."""
-        for name in self.kept if memory is not None else ():
-            setattr(self, name, memory[name])  # type: ignore[index]
+        if memory is not None:
+            self.restore(memory)
 
     def prepare(self, view: View) -> None:
         """Files may be made from here on."""
@@ -64,8 +63,8 @@ class Observer:
     def due(self, view: View) -> bool:
         """Whether to look after this step."""
         if view.quasistatic:
-            return view.due(self.every_passes)
-        return self.every is None or view.due(self.every)
+            return view.crossed_multiple_of(self.every_passes)
+        return self.every is None or view.crossed_multiple_of(self.every)
 
     def look(self, view: View) -> None:
         """Look at the run."""
@@ -80,38 +79,74 @@ class Observer:
         """The run has ended, in whatever way."""
 
     def memory(self) -> dict[str, Any]:
-        """What a resumed run needs: arrays, and plain values as JSON has them, by name."""
+        """What a resumed run needs, by name; see :func:`.storable` for what it may be.
+
+        Raises
+        ------
+        ParameterError
+            The observer lacks an attribute that it keeps.
+        """
+        if missing := [name for name in self.kept if not hasattr(self, name)]:
+            raise ParameterError(f"the observer {self.name} keeps {missing[0]} and has no such attribute: set it in "
+                                 f"`__init__` or `open`")
         return {name: getattr(self, name) for name in self.kept}
+
+    def restore(self, memory: Mapping[str, Any]) -> None:
+        """Take up what `memory` gave.
+
+        Raises
+        ------
+        CheckpointError
+            It has not all attributes that the observer keeps.
+        """
+        if missing := [name for name in self.kept if name not in memory]:
+            raise CheckpointError(f"the observer {self.name} of the checkpoint has not kept {missing[0]}: resume with "
+                                  f"the class the run was begun with, or begin anew")
+        for name in self.kept:
+            setattr(self, name, memory[name])
+
+
+def _place(observer: Observer, standard: Sequence[Observer]) -> str:
+    """Name of the standard observer in whose place one comes; its own, where it comes beside them."""
+    place = next((one.name for one in standard if isinstance(observer, type(one))), "")
+    if observer.name != place and observer.name in [one.name for one in standard]:
+        raise ParameterError(f"the observer {observer.name} would take the place of one of the run, and is not of its "
+                             f"class: give it another `name`")
+    return place or observer.name
 
 
 class Observers:
     """The observers of one run, in the order in which they look.
 
-    Memory: that of each of them.
+    Memory: that of each of them, and whether `loading` was called before.
 
     Parameters
     ----------
     standard: those of every run.
-    own: a user's, who look after these, or take the place of the one of the same name.
+    users: a user's, who look after these; one of the class of a standard one, or of a class that derives from it, takes
+        its place.
+    resumes: whether they go on with a run, and may have been in it before.
 
     Raises
     ------
     ParameterError
-        Two have the same name, or one has that of another class.
+        They are none, one was in another run, two would take one place or name, or one keeps what cannot be stored.
     """
 
-    def __init__(self, standard: Sequence[Observer], users: Sequence[Observer] = ()) -> None:
-        names = [observer.name for observer in users]
-        if twice := next((name for name in names if names.count(name) > 1), None):
-            raise ParameterError(f"two observers are called {twice}: give one of them another `name`")
-        by_name = {observer.name: observer for observer in standard}
-        for observer in users:
-            there = by_name.get(observer.name)
-            if there is not None and not isinstance(observer, type(there)):
-                raise ParameterError(f"the observer {observer.name} would take the place of one of the run, and is not "
-                                     f"of its class: give it another `name`")
-            by_name[observer.name] = observer
-        self._all = tuple(by_name.values())
+    def __init__(self, standard: Sequence[Observer], users: Sequence[Observer] = (), resumes: bool = False) -> None:
+        self._users, self._has_loaded = check_observers(users), False
+        places, taken = {observer.name: observer for observer in standard}, dict[str, str]()
+        for observer in self._users:
+            name, there = observer.name, vars(observer)
+            if observer._used and not resumes:
+                raise ParameterError(f"the observer {name} was in a run before and has its rows: make a new one, "
+                                     f"{type(observer).__name__}(...), for each run")
+            if (place := _place(observer, standard)) in taken:
+                raise ParameterError(f"the observers {taken[place]} and {name} would both take the place of {place}: "
+                                     f"leave one out")
+            places[place], taken[place] = observer, name
+            storable(f"observer {name}", {kept: there[kept] for kept in observer.kept if kept in there})
+        self._all = tuple(places.values())
 
     def of(self, kind: type[Kind]) -> Kind:
         """The first one of a class."""
@@ -127,6 +162,8 @@ class Observers:
         ------
         CheckpointError
             The observers are not those the run had.
+        ParameterError
+            One keeps what cannot be stored.
         """
         if memories is not None:
             if gone := memories.keys() - {observer.name for observer in self._all}:
@@ -136,14 +173,24 @@ class Observers:
                 raise CheckpointError(f"the run in {view.folder} was begun without the observer {min(new)}, which has "
                                       f"to see all of it: resume it without, or begin anew")
         for observer in self._all:
+            observer._used = True
             observer.open(view, (memories or {}).get(observer.name))
         for observer in self._all:
             observer.prepare(view)
+        self._check_memories()
+
+    def _check_memories(self) -> None:
+        """See that a checkpoint can keep what a user's observers remember, before much has been computed."""
+        for observer in self._users:
+            storable(f"observer {observer.name}", observer.memory())
 
     def loading(self, view: View) -> None:
         """A load increment has been taken."""
         for observer in self._all:
             observer.loading(view)
+        if not self._has_loaded:
+            self._has_loaded = True
+            self._check_memories()
 
     def onset(self, view: View) -> None:
         """The body is loaded to its onset."""
@@ -160,6 +207,7 @@ class Observers:
         for observer in self._all:
             observer.begin(view)
             observer.look(view)
+        self._check_memories()
 
     def step(self, view: View) -> None:
         """A step or a pass has been taken."""

@@ -43,11 +43,12 @@ class Progress(Observer):
         state, tips, ledger, X = view.state, view.tips, view.state.ledger, view.body.space.X
         size = float((X.max(axis=0) - X.min(axis=0)).max())
         done = 0.0 if view.quasistatic else state.time / view.end
+        tip = (f"tip {tips.position[0]:.2f}, {tips.position[1]:.2f} mm ×{tips.branches}" if tips.branches
+               else "no tip yet")
         clock = f"pass {state.step}" if view.quasistatic else f"{state.time * 1e6:.1f} µs"
         self.display.update(max(done, 0.9 * tips.length / size), (
-            f"{clock}  tip {tips.position[0]:.2f}, {tips.position[1]:.2f} mm ×{tips.branches}  "
-            f"load {view.load:.3f} {_unit(view)}  elastic {ledger.elastic:.4f} kinetic {ledger.kinetic:.4f} "
-            f"D {ledger.sink:.4f} U {ledger.paper:.4f}"))
+            f"{clock}  {tip}  load {view.load:.3f} {_unit(view)}  elastic {ledger.elastic:.4f} "
+            f"kinetic {ledger.kinetic:.4f} D {ledger.sink:.4f} U {ledger.paper:.4f}"))
 
 
 def _unit(view: View) -> str:

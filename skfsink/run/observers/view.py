@@ -22,10 +22,13 @@ __all__ = ["View"]
 
 @dataclass(eq=False)
 class View:
-    """A run at a moment: the scene, the state, and what follows from them. Observers change nothing in it.
+    """A run at a moment: the scene, the state, and what follows from them.
+
+    Observers change nothing in it, but for :class:`.Crack`, which looks first and sets `tips`, `moment` and `waiting`
+    for all others; an observer in its place has to set them too.
 
     Memory: all of it: the run moves it on with `at`, and `load`, `displacement`, `stress`, `stress_is_known`,
-    `step_share` and `due` are of the moment it is at.
+    `step_share` and `crossed_multiple_of` are of the moment it is at.
 
     Attributes
     ----------
@@ -120,7 +123,7 @@ class View:
         self.moment, self._stress = "", None
         return self
 
-    def due(self, every: float) -> bool:
+    def crossed_multiple_of(self, every: float) -> bool:
         """Whether a multiple of `every` [s], or passes, has been passed in this step."""
         step = (self.RARER if self.waiting else 1.0) * every
         return int(self.state.time / step) != int(self.before / step)
