@@ -59,7 +59,11 @@ def test_a_deck_its_scene_file_and_python_give_the_same_run(folder: Path) -> Non
         assert (folder / "second" / name).read_bytes() == first == (result.folder / name).read_bytes(), name
     before = contents(folder / "first" / "series")
     assert invoke_program("resume", "first", "--quiet")[0] == 0
+    read_deck(folder / "deck.toml").run(resume=folder / "first", quiet=True)
+    custom(grips=grips, options=Options(resume=folder / "first", quiet=True))
     assert contents(folder / "first" / "series") == before
+    with pytest.raises(ParameterError, match="grips are not those of the run in first; a resumed run keeps its scene"):
+        custom(grips=grips[:1], options=Options(resume=Path("first"), quiet=True))
 
 
 def test_custom_plate_is_the_case_of_the_same_plate(folder: Path) -> None:
