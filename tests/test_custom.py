@@ -267,6 +267,10 @@ def test_only_custom_scenes_have_tables(tmp_path: Path) -> None:
     ({"mesh": "coarse"}, "mesh must be the path of a mesh file"), ({"grips": ()}, "at least one grip or traction"),
     ({"speed": 1.0}, "speed is for the cases"), ({"half": True}, "half is for the cases"),
     ({"model": "auto"}, "model is for the cases"),
+    ({"faces": "nope"}, "faces: 'nope' is no boundary of mesh plate, which has bottom, left, notch, right, top;"),
+    ({"faces": "left right"}, "'left right' is no boundary"), ({"faces": ["left"]}, "faces must be text, names of"),
+    ({"grips": [Grip("top", (0, "1 mm"))]}, "grip top, y must be a quantity in mm/s"),
+    ({"tractions": [Traction("top", (True, 0.0))]}, "traction top, x must be a number"),
     ({"grips": [Grip("lid", (0.0, 1.0))]}, "mesh plate has no boundary 'lid'; it has"),
     ({"grips": [Grip("top", (0.0, 1.0, 2.0))]}, "grip top has a component z"),
     ({"tractions": [Traction("top", (0.0, 1.0, 2.0))]}, "traction top has a component z"),
@@ -280,6 +284,11 @@ def test_scenes_that_cannot_be(changed: dict[str, Any], said: str, folder: Path)
         custom(**own, options=Options(**options, length_scale=0.6, out=folder / "out", quiet=True))
     assert said in str(error.value)
     assert not (folder / "out").exists()
+
+
+def test_velocities_with_units_from_python() -> None:
+    """Fails if a grip from Python cannot have the units that one in a deck has."""
+    assert read_tables("grips", [Grip("top", (0, "1 µm/s"))]) == ({"boundary": "top", "x": 0.0, "y": 1e-3},)
 
 
 # --- mesh files ---

@@ -197,6 +197,16 @@ def test_boundaries_must_be_there(mesh: Path) -> None:
         replace(scene(mesh), grips=(Grip("lid", (0.0, 1.0)),))
 
 
+def test_faces_must_be_boundaries(mesh: Path) -> None:
+    """Fails if a crack could arrive at the face of a sheet because its name is misspelt."""
+    base = scene(mesh)
+    assert replace(base, faces=("left",)).faces == ("left",)
+    with pytest.raises(MeshError, match="faces: 'bak' is no boundary of mesh plate, which has bottom, left"):
+        replace(base, faces=("left", "bak"))
+    with pytest.raises(MeshError, match="mesh plate has no boundary 'bak'"):
+        base.sample.rim("bak")
+
+
 def test_numbers_from_numpy_and_python_write_the_same_scene(mesh: Path) -> None:
     """Fails if a parameter study over an array cannot be written down."""
     values = {"phi": np.float64(0.2), "gamma_every": np.int64(3), "c1": np.float32(0.5)}

@@ -156,7 +156,7 @@ def test_rim_of_a_sheet_is_its_edge() -> None:
 def test_dimension_with_a_mesh_file_is_refused(tmp_path) -> None:  # type: ignore[no-untyped-def]
     """Fails if a dimension is silently ignored because the mesh is a file."""
     own = {"side": 4.0, "notch": 1.5, "notch_width": 0.1, "mesh": str(tmp_path / "x.vtu"), "mesh_seed": 0}
-    with pytest.raises(ParameterError, match=r"side, notch, notch-width and mesh-seed are for the meshes coarse"):
+    with pytest.raises(ParameterError, match=r"side, notch, notch_width and mesh_seed are for the meshes coarse"):
         shape_sample("single_edge_notch", own)
 
 

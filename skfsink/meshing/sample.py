@@ -77,10 +77,16 @@ class Sample:
         return _named(self.cells, name, f"mesh {self.name} has no set of elements {name!r}")
 
     def rim(self, *faces: str) -> np.ndarray:
-        """Nodes of the outer boundary without the named `faces`, but with the edges of these."""
+        """Nodes of the outer boundary without the named `faces`, but with the edges of these.
+
+        Raises
+        ------
+        MeshError
+            The mesh has no such boundary.
+        """
         facets = self.space.mesh.facets[:, self.space.mesh.boundary_facets()]
-        for name in set(faces) & self.boundaries.keys():
-            facets = facets[:, ~np.isin(facets, self.boundaries[name]).all(axis=0)]
+        for name in faces:
+            facets = facets[:, ~np.isin(facets, self.nodes(name)).all(axis=0)]
         return np.unique(facets)
 
 
@@ -175,7 +181,7 @@ def shape_sample(case: str, arguments: Mapping[str, Any], lift: Callable[[meshio
         return load_sample(case, name, lift=lift)
     if Path(name).suffix:
         names = (*inspect.signature(shape.make).parameters, "mesh_seed")
-        words = [k.replace("_", "-") for k in names if k in arguments]
+        words = [k for k in names if k in arguments]
         raise ParameterError(f"{', '.join(words[:-1])} and {words[-1]} are for the meshes {', '.join(shape.meshes)}; "
                              f"the mesh file {name} is as it is")
     if name not in shape.meshes:
@@ -192,7 +198,7 @@ def shape_mesh(case: str, arguments: Mapping[str, Any], settings: Mapping[str, A
 
 def _changed(case: str, arguments: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:
     """Arguments of the shape's function that are not those of the committed mesh."""
-    seed = int(require("mesh-seed", arguments["mesh_seed"], low=0, whole=True))
+    seed = int(require("mesh_seed", arguments["mesh_seed"], low=0, whole=True))
     dimensions = {k: arguments[k] for k, p in inspect.signature(SHAPES[case].make).parameters.items()
                   if k in arguments and arguments[k] != p.default}
     return {**dimensions, **settings, **({"seed": seed} if seed else {})}
