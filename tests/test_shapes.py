@@ -111,6 +111,15 @@ def test_seam_that_does_not_match_is_refused() -> None:
         completed(part, "seam", lambda p: np.array([2.0, 1.0]) - p)
 
 
+def test_sections_without_names() -> None:
+    """Fails if a section without lines cannot be swept, or one without quadrilaterals ends in a traceback."""
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    body = swept(meshio.Mesh(points, [("quad", [[0, 1, 2, 3]])]), 0.1, 2)
+    assert len(body.cells_dict["hexahedron"]) == 2 and set(body.cell_sets) == {"back", "front"}
+    with pytest.raises(MeshError, match="must have quadrilaterals; it has triangle"):
+        swept(meshio.Mesh(points, [("triangle", [[0, 1, 2]])]), 0.1, 2)
+
+
 # --- hexahedra ---
 @pytest.mark.parametrize("layers", [1, 2])
 def test_swept_section(layers: int) -> None:

@@ -53,7 +53,7 @@ def run(app: App, arguments: list[str] | None, given_names: Collection[str] = ()
         _fail("interrupted", INTERRUPTED)
     except UnknownCommandError as error:
         known = ", ".join(name for name in app if not name.startswith("-"))
-        _fail(f"command must be one of {known}; got {error.unused_tokens[0]!r}", BAD_INPUT)
+        _fail(f"command must be one of {known}; got {(error.unused_tokens or [''])[0]!r}", BAD_INPUT)
     except (SkfsinkError, CycloptsError) as error:
         _fail(str(error), BAD_INPUT)
     except Exception as error:  # such as the overflow of an absurd parameter, or a mistake in the program

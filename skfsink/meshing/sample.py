@@ -22,6 +22,7 @@ from .files.split import counted, needs_split
 from .files.tidy import notes_of, place
 from .kept_mesh import SUFFIX
 from .mesh_file import check_mesh, one_line, quietly, read_mesh_file
+from .reused import reusable
 from .shapes import SHAPES
 from .vtu import read_mesh
 
@@ -96,6 +97,7 @@ def _named(sets: Mapping[str, np.ndarray], name: str, failure: str) -> np.ndarra
     return sets[name]
 
 
+@reusable
 def load_sample(case: str, mesh: str, make: Callable[[], meshio.Mesh] | None = None,
                 lift: Callable[[meshio.Mesh], meshio.Mesh] | None = None) -> Sample:
     """The sample of `case` on the mesh of that name, or in the mesh file of that path.
@@ -123,6 +125,7 @@ def load_sample(case: str, mesh: str, make: Callable[[], meshio.Mesh] | None = N
     return _from_file(Path(mesh))
 
 
+@reusable
 def kept_sample(path: Path) -> Sample:
     """The sample that a run has left in its folder.
 
@@ -134,6 +137,7 @@ def kept_sample(path: Path) -> Sample:
     return _from_meshio(str(path), read_mesh_file(path))
 
 
+@reusable
 def file_sample(path: Path, merge_nodes: float = 0.0) -> Sample:
     """The sample in a mesh file, whose sides have names; nodes within `merge_nodes` [mm] of each other become one.
 
@@ -160,6 +164,7 @@ def mesh_sample(name: str, mesh: meshio.Mesh) -> Sample:
     return _from_meshio(name, mesh)
 
 
+@reusable
 def shape_sample(case: str, arguments: Mapping[str, Any], lift: Callable[[meshio.Mesh], meshio.Mesh] | None = None,
                  settings: Mapping[str, Any] | None = None) -> Sample:
     """The sample of a case whose shape is one of :data:`.shapes.SHAPES`.

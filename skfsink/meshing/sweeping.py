@@ -37,7 +37,8 @@ def swept(section: meshio.Mesh, thickness: float, layers: int, place: Map | None
                              np.broadcast_to(height, (len(flat), levels, 1))], axis=2).reshape(-1, 3)
     cells = section.cells_dict
     if "quad" not in cells:
-        raise MeshError(f"a section to be swept must have quadrilaterals; it has {', '.join(sorted(cells)) or 'no cells'}")
+        found = ", ".join(sorted(cells)) or "no cells"
+        raise MeshError(f"a section to be swept must have quadrilaterals; it has {found}")
     quads, lines = cells["quad"] * levels, cells.get("line", np.zeros((0, 2), int)) * levels
     hexes = np.concatenate([quads[:, None] + step, quads[:, None] + step + 1], axis=2).reshape(-1, 8)
     walls = np.concatenate([lines[:, None] + step, (lines[:, None] + step + 1)[..., ::-1]], axis=2).reshape(-1, 4)

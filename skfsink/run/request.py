@@ -115,6 +115,10 @@ def _resumed(asked: RunRequest, folder: Path) -> RunRequest:
         raise ParameterError(f"--model {options.model} is not that of the run in {folder} "
                              f"({stored.model_choice.get('model')}); a resumed run keeps its scene")
     check_version(folder)
+    if stored.made_in_python:
+        raise OutputError(f"{folder / SCENE} does not describe its run, parts of which were made in Python "
+                          f"({', '.join(stored.made_in_python)}): resume it from there, with run(scene, folder, "
+                          f"resume=True)")
     _check_agreement(asked, stored, folder)
     try:
         arguments, values = case.from_stored(stored, folder)
