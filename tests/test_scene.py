@@ -298,7 +298,7 @@ DECK = Deck("single_edge_notch", {"mesh": "coarse"})
     (lambda: Options(material=["gent"]), ParameterError, r"material must be text; got \['gent'\]"),
     (lambda: Options(overwrite="no"), ParameterError, "overwrite must be true or false; got 'no'"),
     (lambda: Options(quiet=1), ParameterError, "quiet must be true or false; got 1"),
-    (lambda: Options(active_zone=1), ParameterError, "active-zone must be true or false; got 1"),
+    (lambda: Options(active_zone=1), ParameterError, "active_zone must be true or false; got 1"),
     (lambda: Options(out=3), ParameterError, "out must be a path; got 3"),
     (lambda: Options(resume=[]), ParameterError, r"resume must be a path; got \[\]")])
 def test_what_python_is_given_is_checked(call: Any, kind: type[Exception], message: str, tmp_path: Path,
