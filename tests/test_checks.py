@@ -69,7 +69,7 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
     "kg/mm^3": ({"material": AAA(density=1.433e-6)}, r"kg/mm\^3, give 1433 kg/m\^3"),
     "modulus in Pa": ({"material": AAA(c1=0.617e6)}, r"shear waves would run at 2.\d+e\+04 m/s .*divided by 1e6"),
     "limiter in Pa": ({"law": SinkLaw(phi=0.1686e7)}, r"phi = 1.69e\+06 MPa is 1.4e\+06 of the shear modulus"),
-    "steps": ({"event_time": 100.0}, r"an event-time of 100 s may take \d.\d+e\+09 steps .*lower it"),
+    "steps": ({"event_time": 100.0}, r"an event_time of 100 s may take \d.\d+e\+09 steps .*lower it"),
     "frames": ({"event_time": 1.0, "frame_every": 1e-7}, r"may make 1e\+07 frames .*raise --frame-every"),
 }
 

@@ -45,16 +45,16 @@ def test_numbers_out_of_range(name: str, tmp_path: Path) -> None:
         bad["0"] = "0"
     for text, shown in bad.items():
         line = refused(tmp_path, "--out", tmp_path / "out", f"--{name}", text)
-        assert line.startswith(f"skfsink: {name} must be a ") and " number in " in line
+        assert line.startswith(f"skfsink: {name.replace('-', '_')} must be a ") and " number in " in line
         assert shown in line.partition("; got ")[2]
 
 
 @pytest.mark.parametrize("arguments, parts", [
-    (["--hht-alpha", "-0.34"], ["hht-alpha", "[-0.333333, 0]", "-0.34"]),
-    (["--hht-alpha", "0.01"], ["hht-alpha", "[-0.333333, 0]", "0.01"]),
+    (["--hht-alpha", "-0.34"], ["hht_alpha", "[-0.333333, 0]", "-0.34"]),
+    (["--hht-alpha", "0.01"], ["hht_alpha", "[-0.333333, 0]", "0.01"]),
     (["--courant", "1.01"], ["courant", "(0, 1]", "1.01"]),
     (["--m", "0.99"], ["m must", "[1, inf)", "0.99"]),
-    (["--mass-floor", "1"], ["mass-floor", "[0, 1)", "got 1"]),
+    (["--mass-floor", "1"], ["mass_floor", "[0, 1)", "got 1"]),
     (["--overshoot", "0.2"], ["overshoot", "(0, 0.1]", "0.2"]),
     (["--threads", "1.5"], ["threads", "whole", "[0, 256]", "1.5"]),
     (["--notch", "4"], ["notch", "(0.05, 4) mm", "got 4"]),

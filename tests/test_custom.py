@@ -59,7 +59,11 @@ def test_a_deck_its_scene_file_and_python_give_the_same_run(folder: Path) -> Non
         assert (folder / "second" / name).read_bytes() == first == (result.folder / name).read_bytes(), name
     before = contents(folder / "first" / "series")
     assert invoke_program("resume", "first", "--quiet")[0] == 0
+    read_deck(folder / "deck.toml").run(resume=folder / "first", quiet=True)
+    custom(grips=grips, options=Options(resume=folder / "first", quiet=True))
     assert contents(folder / "first" / "series") == before
+    with pytest.raises(ParameterError, match="grips are not those of the run in first; a resumed run keeps its scene"):
+        custom(grips=grips[:1], options=Options(resume=Path("first"), quiet=True))
 
 
 def test_custom_plate_is_the_case_of_the_same_plate(folder: Path) -> None:
@@ -263,6 +267,10 @@ def test_only_custom_scenes_have_tables(tmp_path: Path) -> None:
     ({"mesh": "coarse"}, "mesh must be the path of a mesh file"), ({"grips": ()}, "at least one grip or traction"),
     ({"speed": 1.0}, "speed is for the cases"), ({"half": True}, "half is for the cases"),
     ({"model": "auto"}, "model is for the cases"),
+    ({"faces": "nope"}, "faces: 'nope' is no boundary of mesh plate, which has bottom, left, notch, right, top;"),
+    ({"faces": "left right"}, "'left right' is no boundary"), ({"faces": ["left"]}, "faces must be text, names of"),
+    ({"grips": [Grip("top", (0, "1 mm"))]}, "grip top, y must be a quantity in mm/s"),
+    ({"tractions": [Traction("top", (True, 0.0))]}, "traction top, x must be a number"),
     ({"grips": [Grip("lid", (0.0, 1.0))]}, "mesh plate has no boundary 'lid'; it has"),
     ({"grips": [Grip("top", (0.0, 1.0, 2.0))]}, "grip top has a component z"),
     ({"tractions": [Traction("top", (0.0, 1.0, 2.0))]}, "traction top has a component z"),
@@ -276,6 +284,11 @@ def test_scenes_that_cannot_be(changed: dict[str, Any], said: str, folder: Path)
         custom(**own, options=Options(**options, length_scale=0.6, out=folder / "out", quiet=True))
     assert said in str(error.value)
     assert not (folder / "out").exists()
+
+
+def test_velocities_with_units_from_python() -> None:
+    """Fails if a grip from Python cannot have the units that one in a deck has."""
+    assert read_tables("grips", [Grip("top", (0, "1 µm/s"))]) == ({"boundary": "top", "x": 0.0, "y": 1e-3},)
 
 
 # --- mesh files ---

@@ -13,6 +13,7 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from plates import deck, invoke, invoke_program, plate
 
+from skfsink.__main__ import COMMANDS
 from skfsink.cli.show import deck_text
 from skfsink.errors import OutputError, ParameterError, SkfsinkError
 from skfsink.meshing.vtu import write_mesh
@@ -20,6 +21,7 @@ from skfsink.results.loader import load
 from skfsink.scene.deck import read_deck
 from skfsink.scene.registry import CASES, find_case, find_case_of_run
 from skfsink.scene.stored import StoredScene
+from skfsink.system.shipped import shipped_decks
 from skfsink.units import in_unit
 
 REFERENCES = sorted((Path(__file__).resolve().parents[1] / "cases").glob("*/reference/*/scene.toml"))
@@ -274,6 +276,25 @@ def test_run_and_resume_from_a_deck(tmp_path: Path) -> None:
     assert (tmp_path / "deck/scene.toml").read_bytes() == (tmp_path / "flags/scene.toml").read_bytes()
     status, err, _ = invoke_program("resume", tmp_path / "deck", "--quiet")
     assert status == 0, err
+
+
+def test_messages_have_the_words_of_a_deck(tmp_path: Path) -> None:
+    """Fails if a message names a parameter otherwise than the deck that is to be corrected."""
+    words = [word for path in (Path(__file__).resolve().parents[1] / "skfsink").rglob("*.py")
+             for word in re.findall(r'\b(?:require|choose|in_unit|number_in)\(f?"([^"]+)"',
+                                    path.read_text(encoding="utf-8"))]
+    assert len(words) > 50 and [word for word in words if "-" in word] == []
+    with pytest.raises(ParameterError, match="event_time must be a finite number"):
+        read_deck(deck(tmp_path, 'case = "dog_bone"\n[parameters]\nevent_time = "-1 s"')).scene()
+
+
+def test_what_is_listed_is_shown_and_every_command_is_named() -> None:
+    """Fails if `show` does not know a deck of `list`, or a wrong command is answered by a part of those there are."""
+    for name, path in shipped_decks().items():
+        status, err, out = invoke_program("show", name)
+        assert (status, err) == (0, "") and (name in CASES or out == path.read_text(encoding="utf-8")), name
+    assert "pure_shear" in invoke_program("show", "trousers")[1]
+    assert invoke_program("nope") == (2, f"skfsink: command must be one of {', '.join(COMMANDS)}; got 'nope'\n", "")
 
 
 @pytest.mark.parametrize("arguments", [["list"], ["show", "dog_bone"], ["--help"], ["run", "--help"]])

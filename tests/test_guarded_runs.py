@@ -155,5 +155,5 @@ def test_energy_that_is_no_number_does_not_pass_into_the_density(sink: str, ener
 @pytest.mark.parametrize("alpha", [-0.334, 0.001])
 def test_alpha_outside_its_range_is_refused(alpha: float):
     """Fails if an alpha is taken with which the scheme is unstable, or dissipates low modes."""
-    with pytest.raises(ParameterError, match=r"hht-alpha must be a finite number in \[-0.333333, 0\]"):
+    with pytest.raises(ParameterError, match=r"hht_alpha must be a finite number in \[-0.333333, 0\]"):
         HHTControls(alpha=alpha)

@@ -318,6 +318,7 @@ def test_the_choice_is_printed_and_stored(ladder: Path, tmp_path: Path, monkeypa
     summary, stored = (json.loads((folder / "summary.json").read_text()),
                        tomllib.loads((folder / "scene.toml").read_text()))
     assert summary["model"]["model"] == stored["choice"]["model"] == "onset"
+    assert summary["verdict"].startswith("only the onset was computed, as by the model onset: ")
     assert summary["quantities"]["onset_load"] > 0.5 and summary["quantities"]["U"] is None
     assert "model" not in stored["parameters"] and read_scene(folder).parameters["event_time"] == 1e-9
     assert invoke("--resume", folder, "--model", "statics")[0] == 2

@@ -508,10 +508,10 @@ def test_names_as_people_write_them(tmp_path: Path) -> None:
     (["in.vtu", "there.vtu"], "there is a file there.vtu already"),
     (["no.vtu", "out.vtu"], "there is no mesh file no.vtu"),
     (["in.vtu", "out.vtu", "--from", "kg"], "from must be a unit of length, such as m or inch; got 'kg'"),
-    (["in.vtu", "out.vtu", "--from", "m", "--merge-nodes", "1 s"], "merge-nodes must be a quantity in mm"),
+    (["in.vtu", "out.vtu", "--from", "m", "--merge-nodes", "1 s"], "merge_nodes must be a quantity in mm"),
     (["in.vtu", "out.vtu", "--merge-nodes", "-1"], "merge_nodes must be"),
     (["in.vtu", "out.vtu", "--merge-nodes", "1"], "would collapse element"),
-    (["in.vtu", "out.vtu", "--length-scale", "0"], "length-scale must be"),
+    (["in.vtu", "out.vtu", "--length-scale", "0"], "length_scale must be"),
     (["in.vtu", "out.vtu", "--boundary", "a=w:1"], "boundary must be NAME=x:1.5"),
     (["in.vtu", "out.vtu", "--boundary", "a=x:min mm"], "boundary a must be a quantity in mm"),
     (["in.vtu", "out.vtu", "--boundary", "a=x:3"], "no edge on the outside lies in x = 3 mm; the body is between 0"),
@@ -570,6 +570,22 @@ def test_overwriting(tmp_path: Path) -> None:
     assert (status, err) == (0, "") and "a run refuses this" in out and "in 2 pieces" in out
     with pytest.raises(MeshError, match="in 2 pieces"):
         file_sample(tmp_path / "out.vtu")
+
+
+@pytest.mark.parametrize(("scale", "said"), [
+    (1e-3, "the body is 0.001 mm across"), (1e3, "the smallest element has h = ")])
+def test_a_size_that_a_run_refuses(scale: float, said: str, tmp_path: Path) -> None:
+    """Fails if the command is silent on coordinates in another unit, on which a run then ends."""
+    x, y = np.meshgrid([0.0, 0.5, 1.0], [0.0, 0.5, 1.0])
+    points = np.column_stack([x.ravel(), y.ravel(), 0 * x.ravel()]) * scale
+    quads = np.array([[0, 1, 4, 3], [1, 2, 5, 4], [3, 4, 7, 6], [4, 5, 8, 7]])
+    meshio.Mesh(points, [("quad", quads)]).write(tmp_path / "in.vtu")
+    status, err, out = invoke_program("mesh", tmp_path / "in.vtu", tmp_path / "out.vtu")
+    assert (status, err) == (0, "") and f"a run refuses this: {said}" in out
+    assert ("give --from m, or" if scale < 1 else "give --from um, or") in out
+    unit = "m" if scale < 1 else "um"
+    status, err, out = invoke_program("mesh", tmp_path / "in.vtu", tmp_path / "right.vtu", "--from", unit)
+    assert (status, err) == (0, "") and "a run refuses" not in out
 
 
 def test_planes_of_names_that_are_taken(tmp_path: Path) -> None:

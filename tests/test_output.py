@@ -18,7 +18,7 @@ from bodies import grid
 
 from skfsink.errors import OutputError
 from skfsink.fem.space import Space
-from skfsink.results.history import HISTORY_COLUMNS, History, history_header, load_name, onset_load
+from skfsink.results.history import HISTORY_COLUMNS, Column, History, history_header, load_name, onset_load
 from skfsink.results.series import Series
 from skfsink.results.summary import versions, write_summary
 from skfsink.system.files import prepare_folder, replaced, write_atomic
@@ -103,6 +103,26 @@ def test_each_column_says_its_unit_and_old_files_are_read(tmp_path: Path, dim: i
     old = history.path.read_text().replace(",".join(header), ",".join(HISTORY_COLUMNS), 1)
     history.path.write_text(old)
     assert same_bits(History.load(history.path), loaded) and History.load(history.path).units == loaded.units
+
+
+def test_columns_of_other_versions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fails if a column of one's own makes runs without it unreadable, or a run with it elsewhere."""
+    history = History(tmp_path / "history.csv", rows())
+    monkeypatch.setitem(HISTORY_COLUMNS, "speed_m_per_s", Column("speed of a node", "m/s", before=math.nan))
+    assert np.isnan(History.load(history.path)["speed_m_per_s"]).all()  # that has the column `loads`
+    text = [line.split(",") for line in history.path.read_text().splitlines()]
+    place = text[0].index("loads_N_mm_per_mm")
+    (tmp_path / "oldest.csv").write_text("".join(",".join(line[:place] + line[place + 1:]) + "\n" for line in text))
+    assert (History.load(tmp_path / "oldest.csv")["loads"] == 0.0).all()
+    monkeypatch.setitem(HISTORY_COLUMNS, "word", Column("a word", "", str))
+    with pytest.raises(OutputError, match="it has no column word"):
+        History.load(history.path)
+    new = History(tmp_path / "new.csv", [{**row, "speed_m_per_s": 2.0, "word": "a"} for row in rows()])
+    for name in ("speed_m_per_s", "word"):
+        monkeypatch.delitem(HISTORY_COLUMNS, name)
+    table = History.load(new.path)
+    assert (table["speed_m_per_s"] == 2.0).all() and set(table["word"]) == {"a"} and table.units["word"] == ""
+    assert same_bits({name: table[name] for name in HISTORY_COLUMNS}, History.load(history.path))
 
 
 @pytest.mark.parametrize("text", ["", "a,b\n1,2\n", ",".join(HISTORY_COLUMNS) + "\nevent,1\n",

@@ -455,7 +455,7 @@ def test_a_jump_of_pressure_between_materials_is_no_checkerboard(caplog: pytest.
     ([("a", [3, 225], LAW)], "region a has the element 225; those of the mesh are 0 to 224"),
     ([("a", [-1, 4], LAW)], "region a has the element -1"),
     ([("a", [3, 4, 5], LAW), ("b", [9, 5, 4], LAW)], "regions a and b overlap: 2 element.s. are in both, such as 4"),
-    ([("a", [3], SinkLaw(length_scale=0.2))], "region a has the length-scale 0.2 mm, the body 0.1 mm"),
+    ([("a", [3], SinkLaw(length_scale=0.2))], "region a has the length_scale 0.2 mm, the body 0.1 mm"),
     ([("a", [3], SinkLaw(epsilon=1e-12))], "region a has the epsilon 1e-12, the body 1e-15"),
 ])
 def test_regions_that_are_refused(regions: list[tuple[str, list[int], SinkLaw]], message: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import random
 import shutil
@@ -22,7 +23,9 @@ import skfsink.run.compute
 from skfsink.meshing.kept_mesh import keep_mesh
 from skfsink.meshing.sample import load_sample
 from skfsink.meshing.vtu import write_mesh
-from skfsink.results.history import History
+from skfsink.results.history import HISTORY_COLUMNS, Column, History
+from skfsink.run.observers.history import VALUES
+from skfsink.scene.deck import read_deck
 
 RUNS = {"explicit": [], "short": ["--event-time", "3e-5"], "quasistatic": ["--analysis", "quasistatic"],
         "consistent": ["--sink", "consistent", "--event-time", "4e-5"],
@@ -245,7 +248,39 @@ def test_parameters_beside_resume_must_agree(arguments: list[str], part: str, st
 def test_checkpoint_of_another_version(stopped: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if a checkpoint whose meaning may have changed is read."""
     monkeypatch.setattr(skfsink.run.checkpoint, "__version__", "0.0.9")
-    refused(stopped, "0.0.9", "--resume", stopped / "run")
+    cure = f"start anew with skfsink run {stopped / 'run' / 'scene.toml'}"
+    refused(stopped, "was written by skfsink", "--resume", stopped / "run")
+    refused(stopped, cure, "--resume", stopped / "run")
+
+
+def test_runs_of_before_a_shared_parameter(stopped: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fails if a run of a version without a parameter is refused for that, or its scene.toml makes another scene."""
+    before = read_deck(stopped / "run/scene.toml").scene()
+    shutil.copytree(stopped, tmp_path, dirs_exist_ok=True)
+    for kind in ("run", "both"):
+        edit(tmp_path / kind / "scene.toml", 'kernels = "compiled"\n', "")
+    again = read_deck(tmp_path / "run/scene.toml").scene()
+    assert again.fingerprint == before.fingerprint and again.controls.kernels == "compiled"
+    monkeypatch.setattr(skfsink.run.checkpoint, "__version__", "0.3.0")
+    for kind in ("run", "both"):
+        refused(tmp_path, f"this is 0.3.0, which cannot go on with it: start anew with skfsink run "
+                          f"{tmp_path / kind / 'scene.toml'}", "--resume", tmp_path / kind)
+
+
+def test_a_column_of_the_history_that_is_not_known(stopped: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+                                                   ) -> None:
+    """Fails if a run with a column of one's own goes on without it, or one that is entered in one place alone runs."""
+    refused_before = "the column speed of the history is not in "
+    monkeypatch.setitem(VALUES, "speed", lambda view: 1.0)
+    refused(stopped, refused_before + "HISTORY_COLUMNS", "--resume", stopped / "run")
+    monkeypatch.setitem(HISTORY_COLUMNS, "speed", Column("of a node", "", before=math.nan))
+    shutil.copytree(stopped, tmp_path, dirs_exist_ok=True)
+    assert forked(["--resume", tmp_path / "run"])[0] == 0
+    monkeypatch.delitem(VALUES, "speed")
+    refused(stopped, refused_before + "VALUES", "--resume", stopped / "run")
+    monkeypatch.delitem(HISTORY_COLUMNS, "speed")
+    refused(tmp_path, "has the column speed in its history", "--resume", tmp_path / "run")
+    assert np.isfinite(History.load(tmp_path / "run" / "history.csv")["speed"][-1])
 
 
 def test_equal_parameters_beside_resume_and_any_working_folder(stopped: Path, tmp_path: Path,

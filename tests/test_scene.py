@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 from bodies import Weight
-from plates import SMALL, invoke, plate
+from plates import SMALL, invoke, invoke_program, plate
 
 from skfsink.cases.custom import custom
 from skfsink.cases.single_edge_notch import CASE, single_edge_notch
@@ -26,9 +26,12 @@ from skfsink.material import MATERIALS, NeoHookean, SinkLaw
 from skfsink.material.regions import Region
 from skfsink.meshing.symmetry import Whole
 from skfsink.meshing.vtu import write_mesh
+from skfsink.report.page import report_page
+from skfsink.results.loader import load
 from skfsink.run.checkpoint import load_state, save_state
 from skfsink.run.compute import run
 from skfsink.scene.deck import Deck, read_deck
+from skfsink.scene.described import made_in_python
 from skfsink.scene.digest import digest
 from skfsink.scene.options import Options
 from skfsink.scene.registry import read_scene
@@ -197,6 +200,53 @@ def test_boundaries_must_be_there(mesh: Path) -> None:
         replace(scene(mesh), grips=(Grip("lid", (0.0, 1.0)),))
 
 
+def test_parts_that_no_parameter_gives(mesh: Path) -> None:
+    """Fails if a part of a scene that is not as its parameters say goes unnoticed, or one that is seems not to be."""
+    base = scene(mesh, length_scale=0.6)
+    gent = Options(half=True, material="gent", constants="E = 1 MPa, nu = 0.49")
+    coarse = CASE.scene({**OWN, "mesh": "coarse"}, gent)
+    for told in (base, coarse, base.part("quasistatic"), replace(base, title="Other"),
+                 replace(base, controls=replace(base.controls, checkpoint_every=1.0))):
+        assert made_in_python(told, CASE) == ()
+    hurried = replace(base.controls, statics=replace(base.controls.statics, increment=0.02))
+    for changes, parts in (({"material": NeoHookean()}, ("material",)), ({"controls": hurried}, ("controls",)),
+                           ({"loads": (partial(Weight, rate=1e-3),), "faces": ("left",)}, ("loads", "faces")),
+                           ({"grips": base.grips[::-1]}, ("grips",)),
+                           ({"parameters": {**base.parameters, "colour": 1}}, ("parameters",))):
+        assert made_in_python(replace(base, **changes), CASE) == parts
+    moved = replace(coarse.sample, boundaries={**coarse.sample.boundaries, "lid": np.arange(3)})
+    assert made_in_python(replace(coarse, sample=moved), CASE) == ("sample",)
+
+
+def test_a_run_that_its_file_does_not_describe(mesh: Path, tmp_path: Path) -> None:
+    """Fails if scene.toml tells another material than the run had, and no one who uses it says so."""
+    odd = replace(scene(mesh, length_scale=0.6, event_time=2e-6), material=NeoHookean(mu=0.5))
+    folder, said = tmp_path / "odd", "does not describe {} run, parts of which were made in Python (material): "
+    result = run(odd, folder, quiet=True)
+    assert [text for text in result.summary["warnings"] if "scene.toml" in text] == [
+        f"scene.toml beside the results {said.format('this')[:-2]}: it can be resumed and run again from there only"]
+    assert load(folder).made_in_python == ("material",)
+    page = report_page([load(folder)])
+    assert "parts were made in Python (material), which parameters and command do not describe" in page
+    history = (folder / "history.csv").read_bytes()
+    for arguments, cure in ((("run", folder / "scene.toml"), "run it again from there"),
+                            (("resume", folder), "resume it from there, with run(scene, folder, resume=True)")):
+        status, err, _ = invoke_program(*arguments)
+        assert status == 2 and said.format("its") + cure in err and err.count("\n") == 1
+    assert run(odd, folder, quiet=True, resume=True).summary["warnings"] == result.summary["warnings"]
+    assert (folder / "history.csv").read_bytes() == history
+
+
+def test_faces_must_be_boundaries(mesh: Path) -> None:
+    """Fails if a crack could arrive at the face of a sheet because its name is misspelt."""
+    base = scene(mesh)
+    assert replace(base, faces=("left",)).faces == ("left",)
+    with pytest.raises(MeshError, match="faces: 'bak' is no boundary of mesh plate, which has bottom, left"):
+        replace(base, faces=("left", "bak"))
+    with pytest.raises(MeshError, match="mesh plate has no boundary 'bak'"):
+        base.sample.rim("bak")
+
+
 def test_numbers_from_numpy_and_python_write_the_same_scene(mesh: Path) -> None:
     """Fails if a parameter study over an array cannot be written down."""
     values = {"phi": np.float64(0.2), "gamma_every": np.int64(3), "c1": np.float32(0.5)}
@@ -248,7 +298,7 @@ DECK = Deck("single_edge_notch", {"mesh": "coarse"})
     (lambda: Options(material=["gent"]), ParameterError, r"material must be text; got \['gent'\]"),
     (lambda: Options(overwrite="no"), ParameterError, "overwrite must be true or false; got 'no'"),
     (lambda: Options(quiet=1), ParameterError, "quiet must be true or false; got 1"),
-    (lambda: Options(active_zone=1), ParameterError, "active-zone must be true or false; got 1"),
+    (lambda: Options(active_zone=1), ParameterError, "active_zone must be true or false; got 1"),
     (lambda: Options(out=3), ParameterError, "out must be a path; got 3"),
     (lambda: Options(resume=[]), ParameterError, r"resume must be a path; got \[\]")])
 def test_what_python_is_given_is_checked(call: Any, kind: type[Exception], message: str, tmp_path: Path,

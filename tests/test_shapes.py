@@ -111,6 +111,15 @@ def test_seam_that_does_not_match_is_refused() -> None:
         completed(part, "seam", lambda p: np.array([2.0, 1.0]) - p)
 
 
+def test_sections_without_names() -> None:
+    """Fails if a section without lines cannot be swept, or one without quadrilaterals ends in a traceback."""
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    body = swept(meshio.Mesh(points, [("quad", [[0, 1, 2, 3]])]), 0.1, 2)
+    assert len(body.cells_dict["hexahedron"]) == 2 and set(body.cell_sets) == {"back", "front"}
+    with pytest.raises(MeshError, match="must have quadrilaterals; it has triangle"):
+        swept(meshio.Mesh(points, [("triangle", [[0, 1, 2]])]), 0.1, 2)
+
+
 # --- hexahedra ---
 @pytest.mark.parametrize("layers", [1, 2])
 def test_swept_section(layers: int) -> None:
@@ -156,7 +165,7 @@ def test_rim_of_a_sheet_is_its_edge() -> None:
 def test_dimension_with_a_mesh_file_is_refused(tmp_path) -> None:  # type: ignore[no-untyped-def]
     """Fails if a dimension is silently ignored because the mesh is a file."""
     own = {"side": 4.0, "notch": 1.5, "notch_width": 0.1, "mesh": str(tmp_path / "x.vtu"), "mesh_seed": 0}
-    with pytest.raises(ParameterError, match=r"side, notch, notch-width and mesh-seed are for the meshes coarse"):
+    with pytest.raises(ParameterError, match=r"side, notch, notch_width and mesh_seed are for the meshes coarse"):
         shape_sample("single_edge_notch", own)
 
 

@@ -71,6 +71,9 @@ def custom(
     """
     if check_options(options).model:
         raise ParameterError(f"model is for the cases of the paper, whose models were measured; got {options.model!r}")
+    if not isinstance(faces, str):
+        raise ParameterError(f"faces must be text, names of boundaries with commas, such as 'back, front'; got "
+                             f"{faces!r:.80}")
     arguments = {"mesh": mesh, "title": title, "faces": faces, "merge_nodes": merge_nodes,
                  "grips": read_tables("grips", grips), "tractions": read_tables("tractions", tractions),
                  "regions": read_tables("regions", regions)}

@@ -48,7 +48,7 @@ def material(name: str, /, *, phi: float | None = None, m: float | None = None, 
     if name in MATERIALS and set(MODULI) & found.keys():
         beside = {key: found.pop(key) for key in ("density", *("bulk_modulus",) * ("nu" not in found)) if key in found}
         if "bulk_modulus" in found:
-            raise ParameterError("bulk-modulus and nu say the same: give one of them")
+            raise ParameterError("bulk_modulus and nu say the same: give one of them")
         found = {**beside, **read_constants(name, ", ".join(f"{key} = {text}" for key, text in found.items()))}
     chosen = material_from(name, {key: _value(text) for key, text in found.items()})
     limiter = limiter_of(name)

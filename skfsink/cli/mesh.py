@@ -53,9 +53,9 @@ def mesh(source: Path, out: Path, /, *, unit: Annotated[str, Parameter(name="--f
     from ..system.files import replaced
     from ..units import in_unit
 
-    merge = in_unit("merge-nodes", merge_nodes, "mm", plain=True)
-    length = in_unit("length-scale", length_scale, "mm", plain=True)
-    require("length-scale", length, "mm", low=0, low_open=True)
+    merge = in_unit("merge_nodes", merge_nodes, "mm", plain=True)
+    length = in_unit("length_scale", length_scale, "mm", plain=True)
+    require("length_scale", length, "mm", low=0, low_open=True)
     if out.suffix.lower() != ".vtu":
         raise ParameterError(f"OUT must be a VTU file, which keeps the sets of a mesh: a name that ends in .vtu; got "
                              f"{str(out)!r}")
@@ -78,10 +78,11 @@ def _report(source: Path, out: Path, made: meshio.Mesh, sample: Sample, length: 
     from rich.console import Console
     from rich.table import Table
 
-    from ..errors import MeshError
+    from ..errors import SkfsinkError
     from ..meshing.files.pieces import check_one_piece
     from ..meshing.files.quality import Quality
     from ..meshing.files.split import counted
+    from ..run.checks import check_size
 
     space, console = sample.space, Console(highlight=False, soft_wrap=True)
     extent = " x ".join(f"{x:.6g}" for x in np.ptp(space.X, axis=0))
@@ -95,10 +96,12 @@ def _report(source: Path, out: Path, made: meshio.Mesh, sample: Sample, length: 
     quality = Quality.of(space)
     flat = int(np.count_nonzero(quality.jacobian <= 0))
     warnings = [f"{flat} element(s) have a corner of 180 degrees or more"] if flat else []
-    try:
-        check_one_piece(sample.name, str(source), space)
-    except MeshError as error:
-        warnings.append(f"a run refuses this: {error}")
+    for check in (lambda: check_one_piece(sample.name, str(source), space),
+                  lambda: check_size(space, length, of_metres="give --from m", of_micrometres="give --from um")):
+        try:
+            check()
+        except SkfsinkError as error:
+            warnings.append(f"a run refuses this: {error}")
     if length / float(quality.h.min()) < 3:
         warnings.append(f"no element is as fine as h = l/3 = {length / 3:.3g} mm, which a crack needs: refine where it "
                         f"may run, or take a longer --length-scale")

@@ -10,7 +10,7 @@ from dataclasses import replace
 from typing import Any, NoReturn
 
 from cyclopts import App, ArgumentCollection, Group
-from cyclopts.exceptions import CycloptsError
+from cyclopts.exceptions import CycloptsError, UnknownCommandError
 
 from ..errors import Interrupted, SkfsinkError
 from ..system.version import __version__
@@ -51,6 +51,9 @@ def run(app: App, arguments: list[str] | None, given_names: Collection[str] = ()
         _fail(str(stop), INTERRUPTED)
     except KeyboardInterrupt:
         _fail("interrupted", INTERRUPTED)
+    except UnknownCommandError as error:
+        known = ", ".join(name for name in app if not name.startswith("-"))
+        _fail(f"command must be one of {known}; got {(error.unused_tokens or [''])[0]!r}", BAD_INPUT)
     except (SkfsinkError, CycloptsError) as error:
         _fail(str(error), BAD_INPUT)
     except Exception as error:  # such as the overflow of an absurd parameter, or a mistake in the program

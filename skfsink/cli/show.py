@@ -21,14 +21,22 @@ EXAMPLES = {
 
 
 def show(case: str) -> None:
-    """Print a deck of a case: every parameter with its meaning, its unit and its default.
+    """Print a deck: of a case every parameter with its meaning, its unit and its default, or a deck as it comes.
 
     Parameters
     ----------
     case
-        Name of the case; `skfsink list` lists them.
+        Name of the case or the deck; `skfsink list` lists them.
     """
-    print(deck_text(case), end="")
+    from ..errors import ParameterError
+    from ..scene.registry import CASES
+    from ..system.shipped import shipped_decks
+
+    decks = {name: path for name, path in shipped_decks().items() if name not in CASES}
+    if case not in (*CASES, *decks):
+        raise ParameterError(f"case must be one of {', '.join(CASES)}, or a deck, one of {', '.join(decks)}; got "
+                             f"{case!r}")
+    print(decks[case].read_text(encoding="utf-8") if case in decks else deck_text(case), end="")
 
 
 def deck_text(case: str) -> str:

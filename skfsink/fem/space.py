@@ -26,7 +26,6 @@ from ..system.jit import njit
 __all__ = ["Space"]
 
 _ELEMENTS = {"quad": skfem.ElementQuad1, "hex": skfem.ElementHex1}
-_CONSTANTS = {"quad": skfem.ElementQuad0, "hex": skfem.ElementHex0}
 #: reference axes in scikit-fem's numbering; its hexahedra are left-handed, so the first two change places
 _AXES = {2: [0, 1], 3: [1, 0, 2]}
 GAUSS = 0.5 - 0.5 / np.sqrt(3.0)  # abscissa of the first Gauss point on [0, 1]
@@ -140,11 +139,6 @@ class Space:
     def u_basis(self) -> skfem.Basis:
         """Q1 vector basis of the displacement."""
         return self.gamma_basis.with_element(skfem.ElementVector(self._elements(_ELEMENTS)))
-
-    @cached_property
-    def mean_basis(self) -> skfem.Basis:
-        """Basis of the element constants, the space of J_bar."""
-        return self.gamma_basis.with_element(self._elements(_CONSTANTS))
 
     def _elements(self, table: dict[str, type]) -> skfem.Element:
         return table["quad" if self.dim == 2 else "hex"]()

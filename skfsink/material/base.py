@@ -41,7 +41,7 @@ class Material:
     density: float = 1433.0
 
     def __post_init__(self) -> None:
-        require("bulk-modulus", self.bulk_modulus, "MPa", low=0, low_open=True)
+        require("bulk_modulus", self.bulk_modulus, "MPa", low=0, low_open=True)
         require("density", self.density, "kg/m^3", low=0, low_open=True)
 
     @property
@@ -81,10 +81,6 @@ class Material:
         _, dpsi, _ = self.isochoric((J ** (-2 / 3) * tr_C)[..., 0, 0])
         dI1 = J ** (-2 / 3) * (2 * F - 2 / 3 * tr_C * Finv_T)
         return dpsi[..., None, None] * dI1 + self.bulk_modulus * (J - 1) * J * Finv_T
-
-    def second_piola(self, F: np.ndarray) -> np.ndarray:
-        """Second Piola-Kirchhoff stress of the undamaged material, S0 = 2 dW/dC [MPa] (Eq. 4, 11); (..., 3, 3)."""
-        return np.linalg.solve(F, self.first_piola(F))
 
     def modulus(self, F: np.ndarray) -> np.ndarray:
         """Tangent modulus A = d2W/dFdF [MPa] of the undamaged material, indices iJkL; (..., 3, 3, 3, 3)."""

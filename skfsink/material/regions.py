@@ -79,7 +79,7 @@ def check_lengths(law: SinkLaw, regions: Sequence[Region]) -> None:
     for region in regions:
         sink_law = region.sink_law
         if sink_law.length_scale != law.length_scale:
-            raise ParameterError(f"region {region.name} has the length-scale {sink_law.length_scale:g} mm, the body "
+            raise ParameterError(f"region {region.name} has the length_scale {sink_law.length_scale:g} mm, the body "
                                  f"{law.length_scale:g} mm: gamma is one field with one length, give both the same")
         if sink_law.epsilon != law.epsilon:
             raise ParameterError(f"region {region.name} has the epsilon {sink_law.epsilon:g}, the body "

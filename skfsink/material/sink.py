@@ -49,7 +49,7 @@ class SinkLaw:
     def __post_init__(self) -> None:
         require("phi", self.phi, "MPa", low=0, low_open=True)
         require("m", self.m, low=1)
-        require("length-scale", self.length_scale, "mm", low=0, low_open=True)
+        require("length_scale", self.length_scale, "mm", low=0, low_open=True)
         require("epsilon", self.epsilon, low=0, high=1e-3, low_open=True)
 
     def history(self, W: Any) -> np.ndarray:

@@ -22,6 +22,7 @@ from .files.split import counted, needs_split
 from .files.tidy import notes_of, place
 from .kept_mesh import SUFFIX
 from .mesh_file import check_mesh, one_line, quietly, read_mesh_file
+from .reused import reusable
 from .shapes import SHAPES
 from .vtu import read_mesh
 
@@ -77,10 +78,16 @@ class Sample:
         return _named(self.cells, name, f"mesh {self.name} has no set of elements {name!r}")
 
     def rim(self, *faces: str) -> np.ndarray:
-        """Nodes of the outer boundary without the named `faces`, but with the edges of these."""
+        """Nodes of the outer boundary without the named `faces`, but with the edges of these.
+
+        Raises
+        ------
+        MeshError
+            The mesh has no such boundary.
+        """
         facets = self.space.mesh.facets[:, self.space.mesh.boundary_facets()]
-        for name in set(faces) & self.boundaries.keys():
-            facets = facets[:, ~np.isin(facets, self.boundaries[name]).all(axis=0)]
+        for name in faces:
+            facets = facets[:, ~np.isin(facets, self.nodes(name)).all(axis=0)]
         return np.unique(facets)
 
 
@@ -90,6 +97,7 @@ def _named(sets: Mapping[str, np.ndarray], name: str, failure: str) -> np.ndarra
     return sets[name]
 
 
+@reusable
 def load_sample(case: str, mesh: str, make: Callable[[], meshio.Mesh] | None = None,
                 lift: Callable[[meshio.Mesh], meshio.Mesh] | None = None) -> Sample:
     """The sample of `case` on the mesh of that name, or in the mesh file of that path.
@@ -117,6 +125,7 @@ def load_sample(case: str, mesh: str, make: Callable[[], meshio.Mesh] | None = N
     return _from_file(Path(mesh))
 
 
+@reusable
 def kept_sample(path: Path) -> Sample:
     """The sample that a run has left in its folder.
 
@@ -128,6 +137,7 @@ def kept_sample(path: Path) -> Sample:
     return _from_meshio(str(path), read_mesh_file(path))
 
 
+@reusable
 def file_sample(path: Path, merge_nodes: float = 0.0) -> Sample:
     """The sample in a mesh file, whose sides have names; nodes within `merge_nodes` [mm] of each other become one.
 
@@ -154,6 +164,7 @@ def mesh_sample(name: str, mesh: meshio.Mesh) -> Sample:
     return _from_meshio(name, mesh)
 
 
+@reusable
 def shape_sample(case: str, arguments: Mapping[str, Any], lift: Callable[[meshio.Mesh], meshio.Mesh] | None = None,
                  settings: Mapping[str, Any] | None = None) -> Sample:
     """The sample of a case whose shape is one of :data:`.shapes.SHAPES`.
@@ -175,7 +186,7 @@ def shape_sample(case: str, arguments: Mapping[str, Any], lift: Callable[[meshio
         return load_sample(case, name, lift=lift)
     if Path(name).suffix:
         names = (*inspect.signature(shape.make).parameters, "mesh_seed")
-        words = [k.replace("_", "-") for k in names if k in arguments]
+        words = [k for k in names if k in arguments]
         raise ParameterError(f"{', '.join(words[:-1])} and {words[-1]} are for the meshes {', '.join(shape.meshes)}; "
                              f"the mesh file {name} is as it is")
     if name not in shape.meshes:
@@ -192,7 +203,7 @@ def shape_mesh(case: str, arguments: Mapping[str, Any], settings: Mapping[str, A
 
 def _changed(case: str, arguments: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:
     """Arguments of the shape's function that are not those of the committed mesh."""
-    seed = int(require("mesh-seed", arguments["mesh_seed"], low=0, whole=True))
+    seed = int(require("mesh_seed", arguments["mesh_seed"], low=0, whole=True))
     dimensions = {k: arguments[k] for k, p in inspect.signature(SHAPES[case].make).parameters.items()
                   if k in arguments and arguments[k] != p.default}
     return {**dimensions, **settings, **({"seed": seed} if seed else {})}

@@ -41,7 +41,7 @@ def single_edge_notch_mesh(*, side: float = 4.0, notch: float = 1.0, notch_width
     `right`, `top`, `bottom` and `notch` (both flanks and the tip).
     """
     check_plate(side, notch, notch_width)
-    require("half-height", half_height, "mm", low=0, low_open=True)
+    require("half_height", half_height, "mm", low=0, low_open=True)
     middle = side / 2
     corridor = (notch - 1.5 * notch_width, side, middle - half_height, middle + half_height)
     return _edge_notched(side, notch, notch_width, SizeField(h, h_coarse, (corridor,), distance=distance), symmetry,
@@ -59,7 +59,7 @@ def simple_shear_mesh(*, side: float = 4.0, notch: float = 2.0, notch_width: flo
     unless `symmetry` is "none". Boundaries as those of the single-edge notched plate.
     """
     check_plate(side, notch, notch_width)
-    require("half-width", half_width, "mm", low=0, low_open=True)
+    require("half_width", half_width, "mm", low=0, low_open=True)
     middle = side / 2
     tip: Box = (notch - 0.25, notch + 0.35, middle - 0.35, middle + 0.35)
     path: Band = (notch, middle, notch + 0.75 * middle, 0, half_width)
@@ -78,7 +78,7 @@ def symmetric_double_edge_notch_mesh(*, side: float = 3.0, notch: float = 0.5, n
     `right`, `top`, `bottom` and `notch` (of both).
     """
     check_two_notches(side, notch, notch_width)
-    require("half-height", half_height, "mm", low=0, low_open=True)
+    require("half_height", half_height, "mm", low=0, low_open=True)
     middle = side / 2
     fine = (notch - 0.15, side - notch + 0.15, middle - half_height, middle + half_height)
     size = SizeField(h, h_coarse, (fine,), distance=distance)
@@ -103,7 +103,7 @@ def asymmetric_double_edge_notch_mesh(*, side: float = 4.0, notch: float = 0.6, 
     """
     check_two_notches(side, notch, notch_width)
     require("offset", offset, "mm", low=0, high=side - 2 * notch_width, high_open=True)
-    require("half-height", half_height, "mm", low=0, low_open=True)
+    require("half_height", half_height, "mm", low=0, low_open=True)
     fine = (0.0, side, side / 2 - half_height, side / 2 + half_height)
     size = SizeField(h, h_coarse, (fine,), distance=distance)
     return _double_edge_notched(side, notch, notch_width, offset, size=size, symmetry=symmetry, seed=seed)
@@ -149,7 +149,7 @@ def cylindrical_shell_mesh(*, inner_radius: float = 1.9, thickness: float = 0.1,
     """
     check_shell(inner_radius, thickness, length, notch, notch_width)
     arc, middle = math.pi * (inner_radius + thickness / 2), length / 2
-    require("half-height", half_height, "mm", low=0, low_open=True)
+    require("half_height", half_height, "mm", low=0, low_open=True)
     r, crown, tip = notch_width / 2, arc / 2, arc / 2 - notch / 2
     outline = [Edge("bottom", (crown, 0)), Edge("seam", (crown, middle - r)), Edge("notch", (tip + r, middle - r)),
                Edge("notch", (tip + r, middle + r), via=(tip, middle)), Edge("notch", (crown, middle + r)),
@@ -167,7 +167,7 @@ def cylindrical_shell_mesh(*, inner_radius: float = 1.9, thickness: float = 0.1,
 def check_plate(side: float, notch: float, notch_width: float) -> None:
     """Refuse dimensions [mm] that are no plate with a notch from its edge (ParameterError)."""
     require("side", side, "mm", low=0, low_open=True)
-    require("notch-width", notch_width, "mm", low=0, high=side, low_open=True, high_open=True)
+    require("notch_width", notch_width, "mm", low=0, high=side, low_open=True, high_open=True)
     require("notch", notch, "mm", low=notch_width / 2, high=side, low_open=True, high_open=True)
 
 
@@ -176,15 +176,15 @@ def check_dog_bone(length: float, gauge_length: float, gauge_width: float, grip_
     for name, value in (("gauge-length", gauge_length), ("gauge-width", gauge_width), ("fillet", fillet)):
         require(name, value, "mm", low=0, low_open=True)
     require("length", length, "mm", low=gauge_length + 2 * fillet, low_open=True)
-    require("grip-width", grip_width, "mm", low=gauge_width + 2 * fillet)
+    require("grip_width", grip_width, "mm", low=gauge_width + 2 * fillet)
 
 
 def check_shell(inner_radius: float, thickness: float, length: float, notch: float, notch_width: float) -> None:
     """Refuse dimensions [mm] that are no half cylinder with a slit (ParameterError)."""
-    require("inner-radius", inner_radius, "mm", low=0, low_open=True)
+    require("inner_radius", inner_radius, "mm", low=0, low_open=True)
     require("thickness", thickness, "mm", low=0, high=2 * inner_radius, low_open=True, high_open=True)
     require("length", length, "mm", low=0, low_open=True)
-    require("notch-width", notch_width, "mm", low=0, high=length, low_open=True, high_open=True)
+    require("notch_width", notch_width, "mm", low=0, high=length, low_open=True, high_open=True)
     arc = math.pi * (inner_radius + thickness / 2)
     require("notch", notch, "mm", low=notch_width, high=arc, low_open=True, high_open=True)
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import meshio
 import numpy as np
 
-from ..errors import require
+from ..errors import MeshError, require
 
 __all__ = ["rolled", "swept", "unrolled"]
 
@@ -25,6 +25,8 @@ def swept(section: meshio.Mesh, thickness: float, layers: int, place: Map | None
     ------
     ParameterError
         `thickness` is not positive or `layers` no whole number of at least 1.
+    MeshError
+        The section has no quadrilaterals.
     """
     require("thickness", thickness, "mm", low=0, low_open=True)
     layers = int(require("layers", layers, low=1, high=100, whole=True))
@@ -33,7 +35,11 @@ def swept(section: meshio.Mesh, thickness: float, layers: int, place: Map | None
     height = np.linspace(0, thickness, levels)[None, :, None]
     points = np.concatenate([np.broadcast_to(flat, (len(flat), levels, 2)),
                              np.broadcast_to(height, (len(flat), levels, 1))], axis=2).reshape(-1, 3)
-    quads, lines = section.cells_dict["quad"] * levels, section.cells_dict["line"] * levels
+    cells = section.cells_dict
+    if "quad" not in cells:
+        found = ", ".join(sorted(cells)) or "no cells"
+        raise MeshError(f"a section to be swept must have quadrilaterals; it has {found}")
+    quads, lines = cells["quad"] * levels, cells.get("line", np.zeros((0, 2), int)) * levels
     hexes = np.concatenate([quads[:, None] + step, quads[:, None] + step + 1], axis=2).reshape(-1, 8)
     walls = np.concatenate([lines[:, None] + step, (lines[:, None] + step + 1)[..., ::-1]], axis=2).reshape(-1, 4)
     faces = np.concatenate([walls, quads[:, ::-1], quads + layers])

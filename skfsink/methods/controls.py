@@ -34,10 +34,10 @@ class ExplicitControls:
 
     def __post_init__(self) -> None:
         require("courant", self.courant, low=0, high=1, low_open=True)
-        require("gamma-every", self.gamma_every, "steps", low=0, whole=True)
-        require("mass-floor", self.mass_floor, low=0, high=1, high_open=True)
-        require("estimate-every", self.estimate_every, "steps", low=1, whole=True)
-        require("estimate-change", self.estimate_change, low=0, high=1, low_open=True, high_open=True)
+        require("gamma_every", self.gamma_every, "steps", low=0, whole=True)
+        require("mass_floor", self.mass_floor, low=0, high=1, high_open=True)
+        require("estimate_every", self.estimate_every, "steps", low=1, whole=True)
+        require("estimate_change", self.estimate_change, low=0, high=1, low_open=True, high_open=True)
 
 
 @dataclass(frozen=True)
@@ -72,15 +72,15 @@ class HHTControls:
     max_iterations: int = 16
 
     def __post_init__(self) -> None:
-        require("hht-alpha", self.alpha, low=-1 / 3, high=0)
-        require("hht-dt", self.dt, "s", low=0, low_open=True)
-        require("hht-dt-first", self.dt_first, "s", low=0)
-        require("hht-dt-least", self.dt_least, "s", low=0, low_open=True)
-        require("force-tolerance", self.force_tolerance, low=0, high=0.1, low_open=True)
-        require("correction-tolerance", self.correction_tolerance, low=0, high=0.1, low_open=True)
-        require("gamma-tolerance", self.gamma_tolerance, low=0, high=0.1, low_open=True)
-        require("max-iterations", self.max_iterations, low=3, whole=True)
-        require("mass-floor", self.mass_floor, low=0, high=1, high_open=True)
+        require("hht_alpha", self.alpha, low=-1 / 3, high=0)
+        require("hht_dt", self.dt, "s", low=0, low_open=True)
+        require("hht_dt_first", self.dt_first, "s", low=0)
+        require("hht_dt_least", self.dt_least, "s", low=0, low_open=True)
+        require("force_tolerance", self.force_tolerance, low=0, high=0.1, low_open=True)
+        require("correction_tolerance", self.correction_tolerance, low=0, high=0.1, low_open=True)
+        require("gamma_tolerance", self.gamma_tolerance, low=0, high=0.1, low_open=True)
+        require("max_iterations", self.max_iterations, low=3, whole=True)
+        require("mass_floor", self.mass_floor, low=0, high=1, high_open=True)
         if self.coupling not in COUPLINGS:
             raise ParameterError(f"coupling must be one of {', '.join(COUPLINGS)}; got {self.coupling!r}")
         if self.mass not in MASSES:
@@ -123,13 +123,13 @@ class StaticsControls:
     max_passes: int = 80
 
     def __post_init__(self) -> None:
-        require("static-tolerance", self.tolerance, low=0, high=0.01, low_open=True)
-        require("gamma-tolerance", self.gamma_tolerance, low=0, high=0.01, low_open=True)
+        require("static_tolerance", self.tolerance, low=0, high=0.01, low_open=True)
+        require("gamma_tolerance", self.gamma_tolerance, low=0, high=0.01, low_open=True)
         require("front", self.front, low=0, high=1)
         require("increment", self.increment, low=0, high=0.5, low_open=True)
-        require("onset-tolerance", self.onset_tolerance, low=0, high=0.1, low_open=True)
-        require("max-newton", self.max_newton, low=3, whole=True)
-        require("max-passes", self.max_passes, low=3, whole=True)
+        require("onset_tolerance", self.onset_tolerance, low=0, high=0.1, low_open=True)
+        require("max_newton", self.max_newton, low=3, whole=True)
+        require("max_passes", self.max_passes, low=3, whole=True)
 
 
 class EventControls(Protocol):

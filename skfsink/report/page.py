@@ -157,7 +157,7 @@ def _flat(value: object) -> str:
 
 def _waves(run: Run) -> tuple[float, float] | None:
     """Shear and Rayleigh wave speed [m/s] of a dynamic run; None where there is nothing to compare with them."""
-    if run.analysis != "dynamic":
+    if run.analysis != "dynamic" or run.made_in_python:
         return None
     try:
         parts = run.scene.parts
@@ -186,7 +186,18 @@ def _symbols(text: str) -> Markup:
 
 
 def _note(run: Run) -> str:
-    """What is to be said of a run that computed a part of the sample only."""
+    """What is to be said of a run that computed a part of the sample only, or whose parameters are not all of it."""
+    return "; ".join(filter(None, (_of_python(run), _of_part(run))))
+
+
+def _of_python(run: Run) -> str:
+    """Of a run of which a part of the scene was made in Python."""
+    return (f"parts were made in Python ({', '.join(run.made_in_python)}), which parameters and command do not describe"
+            if run.made_in_python else "")
+
+
+def _of_part(run: Run) -> str:
+    """Of a run that computed a part of the sample only."""
     whole = run.summary.get("whole") or {}
     if all(factor == 1.0 for factor in whole.values()):
         return ""

@@ -26,11 +26,13 @@ class Column(NamedTuple):
     meaning: in words.
     unit: for a plane body: "1" for plain numbers, "" for words. N/mm and N mm/mm are N and N mm for one in space.
     kind: of its values.
+    before: its value in files that were written before there was the column; None if there are no such files.
     """
 
     meaning: str
     unit: str = "1"
     kind: type = float
+    before: Any = None
 
 
 _FORCE, _ENERGY = "N/mm", "N mm/mm"  # of a plane body
@@ -43,7 +45,7 @@ HISTORY_COLUMNS: dict[str, Column] = {
     "grip_displacement_mm": Column("displacement of a grip", "mm"),
     "reaction_N_per_mm": Column("force on a grip along its motion", _FORCE),
     "elastic": Column("gamma-weighted stored energy", _ENERGY),
-    "loads": Column("potential of the dead loads", _ENERGY),
+    "loads": Column("potential of the dead loads", _ENERGY, before=0.0),
     "kinetic": Column("gamma-weighted kinetic energy", _ENERGY),
     "work": Column("work of the grips, and of dead loads that change", _ENERGY),
     "sink_stored": Column("stored energy taken by the sink, the first part of D", _ENERGY),
@@ -64,7 +66,6 @@ HISTORY_COLUMNS: dict[str, Column] = {
     "gamma_min": Column("least relative density of a node"),
     "dt_s": Column("time step", "s"),
 }
-_LATER = ("loads",)  # columns that files of before have not; they are 0 there
 _IN_SPACE = {_FORCE: "N", _ENERGY: "N mm"}
 _SUFFIX = {"s": "_s", "mm": "_mm", "m/s": "_m_per_s", "N/mm": "_N_per_mm", "N": "_N", "N mm/mm": "_N_mm_per_mm",
            "N mm": "_N_mm", "1": "", "": ""}
@@ -106,12 +107,13 @@ class Table(dict[str, np.ndarray]):
 
     Attributes
     ----------
-    dim: dimensions of the body, 2 or 3.   units: of the columns, by name of `HISTORY_COLUMNS`.
+    dim: dimensions of the body, 2 or 3.
+    units: of the columns, by name of `HISTORY_COLUMNS`; "" for a column of a file that this does not have.
     """
 
     def __init__(self, columns: Mapping[str, np.ndarray], dim: int) -> None:
         super().__init__(columns)
-        self.dim, self.units = dim, history_units(dim)
+        self.dim, self.units = dim, {**history_units(dim), **dict.fromkeys(columns.keys() - HISTORY_COLUMNS.keys(), "")}
 
     def __missing__(self, name: str) -> np.ndarray:
         names = dict(zip(history_header(self.dim), HISTORY_COLUMNS))
@@ -142,7 +144,8 @@ class History:
         write_atomic(self.path, _csv([history_header(dim), *(row.values() for row in self.rows)]))
 
     def append(self, row: Mapping[str, Any]) -> None:
-        """Add a row. Columns that it leaves out are NaN, counts and loads are 0; an unknown column is a KeyError."""
+        """Add a row. Columns that it leaves out are as :attr:`Column.before` says, else NaN, and counts 0; an unknown
+        column is a KeyError."""
         self.rows.append(_row(row))
         with reported(f"cannot write {self.path}"), open(self.path, "a", encoding="utf-8", newline="") as file:
             file.write(_csv([self.rows[-1].values()]))
@@ -155,41 +158,63 @@ class History:
     def load(path: str | Path) -> Table:
         """Columns of a history file, as in :meth:`columns`; a last line that was not finished is left out.
 
-        A file of version 0.1, whose header does not tell units, is taken to be of a body in space if it has a z.
+        A file of version 0.1, whose header does not tell units, is taken to be of a body in space if it has a z. A
+        column of the file that is not in `HISTORY_COLUMNS` keeps its name: numbers, or else text, without a unit.
 
         Raises
         ------
         OutputError
-            The file cannot be read, or is not a history.
+            The file cannot be read, is not a history, or has not all columns.
         """
         with reported(f"cannot read the history {path}"):
             text = Path(path).read_text(encoding="utf-8", errors="replace")
         try:
             header, *lines = csv.reader(text[:text.rfind("\n") + 1].splitlines())
             known, dim = _known(header)
-            values = {name: [line[i] for line in lines] for i, name in enumerate(known)}
-            columns = _columns({name: values.get(name, ["0"] * len(lines)) for name in HISTORY_COLUMNS})
+            values = {name: [line[i] for line in lines] for name, i in known.items()}
+            columns = _columns({name: values.get(name, [column.before] * len(lines))
+                                for name, column in HISTORY_COLUMNS.items()})
+            unknown = {name: _unknown(values[name]) for name in known if name not in HISTORY_COLUMNS}
+        except OutputError as error:
+            raise OutputError(f"{path} is not a history file of this version, or is damaged: {error}") from None
         except (IndexError, ValueError) as error:
             raise OutputError(f"{path} is not a history file of skfsink, or is damaged") from error
-        return Table(columns, dim or (3 if np.isfinite(columns["tip_z_mm"]).any() else 2))
+        return Table({**columns, **unknown}, dim or (3 if np.isfinite(columns["tip_z_mm"]).any() else 2))
 
 
-def _known(header: list[str]) -> tuple[list[str], int]:
-    """Columns of a file by its header, and the dimensions of its body, 0 if it does not tell; ValueError else."""
-    for left_out in ((), _LATER):
-        known = [name for name in HISTORY_COLUMNS if name not in left_out]
-        for dim in (2, 3):
-            if header == [column for name, column in zip(HISTORY_COLUMNS, history_header(dim)) if name in known]:
-                return known, dim
-        if header == known:
-            return known, 0
-    raise ValueError
+def _known(header: list[str]) -> tuple[dict[str, int], int]:
+    """Place of each column in a file by its header, and the dimensions of its body, 0 if it does not tell.
+
+    ValueError: it is no header, or a column is there twice. OutputError: one is missing that has no value for files of
+    before.
+    """
+    found = []
+    for dim in (2, 3, 0):
+        names = dict(zip(history_header(dim) if dim else HISTORY_COLUMNS, HISTORY_COLUMNS))
+        known = {names.get(column, "" if column in HISTORY_COLUMNS else column): i for i, column in enumerate(header)}
+        missing = [name for name, column in HISTORY_COLUMNS.items() if name not in known and column.before is None]
+        found.append((missing, known, dim))
+    missing, known, dim = min(found, key=lambda one: len(one[0]))
+    if len(known) < len(header) or len(missing) > len(HISTORY_COLUMNS) / 2:
+        raise ValueError
+    if missing:
+        raise OutputError(f"it has no column {missing[0]}; one that files of before lack needs a value `before` in "
+                          f"HISTORY_COLUMNS")
+    return known, dim
+
+
+def _unknown(values: Sequence[str]) -> np.ndarray:
+    """Values of a column of which only the name is known: numbers, or else text."""
+    try:
+        return np.array(values, float)
+    except ValueError:
+        return np.array(values, str)
 
 
 def _row(values: Mapping[str, Any]) -> dict[str, Any]:
     if unknown := values.keys() - HISTORY_COLUMNS.keys():
         raise KeyError(f"the history has no column {', '.join(sorted(unknown))}")
-    return {name: column.kind(values.get(name, 0.0 if name in _LATER else _MISSING[column.kind]))
+    return {name: column.kind(values.get(name, _MISSING[column.kind] if column.before is None else column.before))
             for name, column in HISTORY_COLUMNS.items()}
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import csv
 import io
+import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
 
 __all__ = ["ENERGIES", "FIELD_UNITS", "Deletions", "Energy", "Frames", "Run", "load"]
 
+log = logging.getLogger(__name__)
 #: Units of the fields of a frame.
 FIELD_UNITS = {"displacement": "mm", "velocity": "mm/s", "gamma": "1", "deleted": "1", "W": "MPa", "gamma_element": "1",
                "stress": "MPa", "pressure": "MPa", "von_mises": "MPa", "crushed": "1", "region": "1"}
@@ -131,6 +133,7 @@ class Run:
     summary: content of `summary.json`; empty if the run is not finished.
     case, parameters, assumed, model_choice: content of `scene.toml`; the mesh is the file that was given to the run,
         not the copy that this keeps.
+    made_in_python: parts of the scene that `scene.toml` does not describe, such as "material".
     parts: of `analysis="both"` the two runs, "dynamic" and "quasistatic", as far as they were begun; otherwise empty.
     """
 
@@ -141,6 +144,7 @@ class Run:
     assumed: tuple[str, ...]
     model_choice: dict[str, Any]
     parts: dict[str, Run]
+    made_in_python: tuple[str, ...] = ()
 
     @property
     def finished(self) -> bool:
@@ -174,9 +178,14 @@ class Run:
 
     @cached_property
     def scene(self) -> Scene:
-        """The scene, with mesh and material, made again from `scene.toml`."""
+        """The scene, with mesh and material, made again from `scene.toml`; it warns of parts that are not those of the
+        run.
+        """
         from ..scene.registry import read_scene
 
+        if self.made_in_python:
+            log.warning("parts of the run in %s were made in Python (%s): those of the scene in its %s are others",
+                        self.folder, ", ".join(self.made_in_python), SCENE)
         return read_scene(self.folder)
 
     @cached_property
@@ -252,4 +261,5 @@ def load(folder: str | Path) -> Run:
     summary = read_summary(folder) if (folder / SUMMARY).exists() else {}
     parts = {name: load(folder / name) for name in ("dynamic", "quasistatic")
              if parameters.get("analysis") == "both" and (folder / name / SCENE).is_file()}
-    return Run(folder, summary, stored.case, parameters, stored.assumed, dict(stored.model_choice), parts)
+    return Run(folder, summary, stored.case, parameters, stored.assumed, dict(stored.model_choice), parts,
+               stored.made_in_python)

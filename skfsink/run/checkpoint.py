@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Mapping
+import shlex
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -12,11 +14,14 @@ import numpy as np
 
 from ..errors import CheckpointError, ParameterError, first_line
 from ..fields.state import State
+from ..scene.stored import SCENE
 from ..system.files import write_atomic
 from ..system.version import __version__
 
-__all__ = ["Stored", "load_checkpoint", "load_state", "save_checkpoint", "save_state", "storable"]
+__all__ = ["CHECKPOINT", "Stored", "check_version", "load_checkpoint", "load_state", "save_checkpoint", "save_state",
+           "storable"]
 
+CHECKPOINT = "checkpoint.npz"
 PLAIN = (bool, int, float, str, type(None))  # what JSON gives back as it was, beside lists and dicts
 
 
@@ -94,15 +99,11 @@ def load_checkpoint(path: Path, fingerprint: str) -> Stored:
     """
     if not path.is_file():
         raise CheckpointError(f"there is no checkpoint {path}")
-    try:
-        with np.load(path, allow_pickle=False) as data:
-            arrays = {name: data[name] for name in data.files}
+    with _undamaged(path), np.load(path, allow_pickle=False) as data:
+        arrays = {name: data[name] for name in data.files}
         meta = json.loads(arrays.pop("meta").tobytes())
         version, found = meta["version"], meta["fingerprint"]
-    except Exception as error:
-        raise CheckpointError(f"the checkpoint {path} is damaged: {first_line(error)}") from None
-    if version != __version__:
-        raise CheckpointError(f"the checkpoint {path} was written by skfsink {version}, this is {__version__}")
+    _refuse_version(version, path.parent)
     if found != fingerprint:
         raise CheckpointError(f"the checkpoint {path} belongs to another scene than scene.toml beside it")
     try:
@@ -113,6 +114,35 @@ def load_checkpoint(path: Path, fingerprint: str) -> Stored:
         return Stored(State.restored(memories.pop("state"), meta["state"]), memories)
     except (KeyError, TypeError) as error:
         raise CheckpointError(f"the checkpoint {path} is damaged: {error} is missing") from None
+
+
+def check_version(folder: Path) -> None:
+    """Refuse to go on with the run in a folder if another version has written it (CheckpointError).
+
+    A run of both analyses has its checkpoints in the folders of these; a missing one is for who reads it to refuse.
+    """
+    for path in (folder / CHECKPOINT, *(folder / part / CHECKPOINT for part in ("dynamic", "quasistatic"))):
+        if path.is_file():
+            with _undamaged(path), np.load(path, allow_pickle=False) as data:
+                version = json.loads(data["meta"].tobytes())["version"]
+            _refuse_version(version, folder)
+
+
+def _refuse_version(version: str, folder: Path) -> None:
+    """Refuse what another version has written in the folder of a run."""
+    if version != __version__:
+        raise CheckpointError(f"the run in {folder} was written by skfsink {version}, this is {__version__}, which "
+                              f"cannot go on with it: start anew with skfsink run "
+                              f"{shlex.quote(str(folder / SCENE))}")
+
+
+@contextmanager
+def _undamaged(path: Path) -> Iterator[None]:
+    """Whatever goes wrong while a checkpoint is read is a CheckpointError."""
+    try:
+        yield
+    except Exception as error:
+        raise CheckpointError(f"the checkpoint {path} is damaged: {first_line(error)}") from None
 
 
 def save_state(path: Path, fingerprint: str, state: State) -> None:

@@ -16,12 +16,13 @@ import numpy as np
 
 from ..errors import ParameterError
 from ..fem import indicators
+from ..fem.space import Space
 from ..loads.rigid import free_motions, moves_as_a_whole, pieces
 from ..loads.schedule import Loading
 from ..material.regions import Region
 from ..scene.scene import Scene
 
-__all__ = ["Expected", "refuse", "warn"]
+__all__ = ["Expected", "check_size", "refuse", "warn"]
 
 log = logging.getLogger(__name__)
 
@@ -118,16 +119,8 @@ def refuse(scene: Scene) -> None:
         faster than waves before a static onset; more steps or frames than can be made; a body, or a piece of one,
         that nothing holds or nothing strains.
     """
-    space, l = scene.sample.space, scene.sink_law.length_scale
-    size, h = float(np.ptp(space.X, axis=0).max()), float(space.h.min())
-    if size < LEAST_BODY[0] * l:
-        raise ParameterError(f"the body is {size:.3g} mm across, {size / l:.2g} of the length l = {l:g} mm over which "
-                             f"damage spreads: coordinates are in mm, so multiply those of a mesh in m by 1000, or "
-                             f"lower --length-scale")
-    if h > LARGEST_H * l:
-        raise ParameterError(f"the smallest element has h = {h:.3g} mm, {h / l:.3g} times the length l = {l:g} mm over "
-                             f"which damage spreads (at most {LARGEST_H:g}): coordinates are in mm, so divide those of "
-                             f"a mesh in µm by 1000, or raise --length-scale")
+    space = scene.sample.space
+    check_size(space, scene.sink_law.length_scale)
     for part in scene.parts:
         _refuse_material(scene, part)
     loading = scene.loading()
@@ -149,6 +142,22 @@ def refuse(scene: Scene) -> None:
         whole = "the body" if count == 1 else f"each of the {count} pieces of the body, which are not joined,"
         raise ParameterError(f"the grips move {whole} as a whole and strain nothing: hold another boundary in the "
                              f"direction of the one that moves{', or merge nodes that coincide' if count > 1 else ''}")
+
+
+def check_size(space: Space, length_scale: float, *, of_metres: str = "multiply those of a mesh in m by 1000",
+               of_micrometres: str = "divide those of a mesh in µm by 1000") -> None:
+    """Refuse a body smaller than the length l [mm] of the sink, and elements of many l (ParameterError).
+
+    `of_metres` and `of_micrometres` are the cures of a mesh in one of these units.
+    """
+    l, size, h = length_scale, float(np.ptp(space.X, axis=0).max()), float(space.h.min())
+    if size < LEAST_BODY[0] * l:
+        raise ParameterError(f"the body is {size:.3g} mm across, {size / l:.2g} of the length l = {l:g} mm over which "
+                             f"damage spreads: coordinates are in mm, so {of_metres}, or lower --length-scale")
+    if h > LARGEST_H * l:
+        raise ParameterError(f"the smallest element has h = {h:.3g} mm, {h / l:.3g} times the length l = {l:g} mm over "
+                             f"which damage spreads (at most {LARGEST_H:g}): coordinates are in mm, so "
+                             f"{of_micrometres}, or raise --length-scale")
 
 
 def _refuse_material(scene: Scene, part: Region) -> None:
@@ -185,12 +194,12 @@ def _refuse_events(scene: Scene, loading: Loading) -> None:
         raise ParameterError(f"{_loads(scene, speed, pull)}, faster than waves (c_s = {_slowest(scene):.3g} m/s), and "
                              f"the loading to the onset is static: lower the rate, or take --start rest")
     if expected.steps > STEPS[1]:
-        raise ParameterError(f"an event-time of {c.event_time:.3g} s may take {expected.steps:.2g} steps of about "
+        raise ParameterError(f"an event_time of {c.event_time:.3g} s may take {expected.steps:.2g} steps of about "
                              f"{expected.dt:.2g} s (at most {STEPS[1]:g}): lower it to a few times the time in which "
                              f"the crack crosses the body, or raise the step, as by a coarser mesh")
     if expected.frames > FRAMES[1]:
         raise ParameterError(f"a frame every {c.frame_every:.3g} s may make {expected.frames:.2g} frames in an "
-                             f"event-time of {c.event_time:.3g} s (at most {FRAMES[1]:g}): raise --frame-every, or "
+                             f"event_time of {c.event_time:.3g} s (at most {FRAMES[1]:g}): raise --frame-every, or "
                              f"lower --event-time")
 
 
@@ -256,12 +265,12 @@ def _warn_of_events(scene: Scene, loading: Loading, folder: Path) -> None:
                     _slowest(scene), FAST[0])
     if expected.steps > STEPS[0] or expected.days > DAYS:
         log.warning("the event may take %.2g steps of about %.2g s, %.2g days of computing, if it lasts for the whole "
-                    "event-time of %.3g s: lower --event-time", expected.steps, expected.dt, expected.days,
+                    "event_time of %.3g s: lower --event-time", expected.steps, expected.dt, expected.days,
                     c.event_time)
     there = float(shutil.disk_usage(next(p for p in _above(folder) if p.exists())).free)
     if expected.frames > FRAMES[0] or expected.rows > ROWS or expected.bytes > there:
         log.warning("the event may leave %.2g frames and %.2g rows of the history, about %.2g GB (there are %.2g GB), "
-                    "if it lasts for the whole event-time of %.3g s: lower --event-time, or raise --frame-every and "
+                    "if it lasts for the whole event_time of %.3g s: lower --event-time, or raise --frame-every and "
                     "--record-every", expected.frames, expected.rows, expected.bytes / 1e9, there / 1e9, c.event_time)
 
 

@@ -22,7 +22,9 @@ from ..results.result import Result
 from ..results.summary import write_summary
 from ..scene.case import Case
 from ..scene.deck import Deck
+from ..scene.described import made_in_python
 from ..scene.options import Options
+from ..scene.registry import CASES, find_case
 from ..scene.scene import Scene
 from ..scene.schedule import check_observers
 from ..scene.stored import SCENE, corridor_mesh
@@ -91,7 +93,7 @@ def run_case(case: Case, arguments: dict[str, Any], options: Options) -> Result:
         with Display(options.quiet) as display:
             if request.model_choice:
                 display.say(request.model_choice["text"])
-            job = _Job(request.folder, display, request.resumes, options.observers, request.notes)
+            job = _Job(request.folder, display, request.resumes, options.observers, request.notes, case)
             return _compute(request.scene(), job, request.options.overwrite, partial(_with_corridor, request))
     except (Interrupted, KeyboardInterrupt):
         begun = (request.folder / SCENE).exists()
@@ -107,13 +109,18 @@ def _how_to_go_on(request: RunRequest) -> str:
 
 @dataclass(frozen=True)
 class _Job:
-    """Where a run goes, whether it goes on, who looks at it, and what it has to warn of at its beginning."""
+    """Where a run goes, whether it goes on, who looks at it, and what it has to warn of at its beginning.
+
+    `case` made its scene, and `made_in_python` are the parts of this that are not as the case makes them.
+    """
 
     folder: Path
     display: Display
     resumes: bool
     observers: tuple[Observer, ...] = ()
     notes: tuple[str, ...] = ()
+    case: Case | None = None
+    made_in_python: tuple[str, ...] = ()
 
     def part(self, analysis: str, resumes: bool) -> _Job:
         """That of one of both analyses, with observers of its own."""
@@ -148,7 +155,8 @@ def _compute(scene: Scene, job: _Job, overwrite: bool,
             if remeshed is not scene:
                 _check(scene := remeshed, job)
         notes += _lock(locks, [place for place in folders if place not in before])
-        job = replace(job, notes=tuple(filter(None, notes)))
+        case = job.case or (find_case(scene.case) if scene.case in CASES else None)  # of no other case is a scene read
+        job = replace(job, notes=tuple(filter(None, notes)), made_in_python=made_in_python(scene, case) if case else ())
         return _run_both(scene, job) if both else _run_one(scene, job)
 
 
@@ -187,11 +195,14 @@ def _begin(folder: Path, overwrite: bool) -> None:
         (folder / name).unlink(missing_ok=True)
 
 
-def _write_scene(scene: Scene, folder: Path) -> None:
-    """Write `scene.toml`, and before it the mesh unless it is one that comes with the program."""
+def _write_scene(scene: Scene, folder: Path, parts: tuple[str, ...]) -> None:
+    """Write `scene.toml`, and before it the mesh unless it is one that comes with the program.
+
+    `parts` of the scene were made in Python.
+    """
     if scene.sample.source or scene.sample.made:
         keep_mesh(scene.sample, folder / MESH)
-    scene.stored(MESH).write(folder)
+    replace(scene.stored(MESH), made_in_python=parts).write(folder)
 
 
 def _run_both(scene: Scene, job: _Job) -> Result:
@@ -202,7 +213,7 @@ def _run_both(scene: Scene, job: _Job) -> Result:
     if not job.resumes:
         for analysis in PARTS:
             _begin(folder / analysis, overwrite=True)
-        _write_scene(scene, folder)
+        _write_scene(scene, folder, job.made_in_python)
     parts: dict[str, Result] = {}
     onset: Loaded | None = None
     for analysis, part in scenes.items():
@@ -249,9 +260,12 @@ def _run_one(scene: Scene, job: _Job, onset: Loaded | None = None) -> Result:
     with simulation.notes:
         for note in job.notes:
             log.warning(note)
+        if job.made_in_python and not job.resumes:
+            log.warning("%s beside the results does not describe this run, parts of which were made in Python (%s): "
+                        "it can be resumed and run again from there only", SCENE, ", ".join(job.made_in_python))
     if not job.resumes:
         simulation.checkpoint()  # from here on the run can be resumed, whenever it is killed
-        _write_scene(scene, job.folder)
+        _write_scene(scene, job.folder, job.made_in_python)
     _announce(simulation, job)
     state = simulation.run(onset)
     return _finished(simulation, state, job)

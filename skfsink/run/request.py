@@ -15,6 +15,8 @@ from ..scene.case import Case, shared_parameters
 from ..scene.options import NOT_PHYSICS, Options
 from ..scene.scene import Scene
 from ..scene.stored import SCENE, StoredScene, corridor_mesh, kept_mesh
+from ..scene.tables import read_tables
+from .checkpoint import check_version
 from .model import AUTO, choose_model
 
 __all__ = ["RunRequest", "check_options", "read_request"]
@@ -112,6 +114,11 @@ def _resumed(asked: RunRequest, folder: Path) -> RunRequest:
     if options.model not in ("", AUTO, stored.model_choice.get("model")):
         raise ParameterError(f"--model {options.model} is not that of the run in {folder} "
                              f"({stored.model_choice.get('model')}); a resumed run keeps its scene")
+    check_version(folder)
+    if stored.made_in_python:
+        raise OutputError(f"{folder / SCENE} does not describe its run, parts of which were made in Python "
+                          f"({', '.join(stored.made_in_python)}): resume it from there, with run(scene, folder, "
+                          f"resume=True)")
     _check_agreement(asked, stored, folder)
     try:
         arguments, values = case.from_stored(stored, folder)
@@ -127,9 +134,13 @@ def _resumed(asked: RunRequest, folder: Path) -> RunRequest:
 def _check_agreement(asked: RunRequest, stored: StoredScene, folder: Path) -> None:
     """Refuse parameters that were asked for and are not those of the run in the folder (ParameterError)."""
     defaults = {**asked.case.defaults, **Options().parameters()}
-    parameters = stored.parameters_in(folder)
+    parameters = {**asked.case.newer, **stored.parameters_in(folder)}
     for name, value in {**asked.arguments, **asked.options.parameters()}.items():
         there = parameters.get(name)
+        if name in asked.case.tables:
+            if len(value) and read_tables(name, value) != read_tables(name, there or ()):
+                raise ParameterError(f"{name} are not those of the run in {folder}; a resumed run keeps its scene")
+            continue
         same = value == there or (name == "mesh" and origin(value) == origin(str(there)))
         if (name in asked.options.given_names or value != defaults[name]) and not same:
             raise ParameterError(f"--{name.replace('_', '-')} {value} is not that of the run in {folder} ({there}); "

@@ -18,7 +18,7 @@ from ..methods.integrators import INTEGRATORS, Integrator
 from ..methods.rest import LoadingFromRest
 from ..methods.statics import Statics
 from ..scene.scene import Scene
-from .checkpoint import load_checkpoint, save_checkpoint, save_state
+from .checkpoint import CHECKPOINT, load_checkpoint, save_checkpoint, save_state
 from .checks import warn
 from .cost import Cost
 from .display import Display, Interrupt
@@ -68,7 +68,7 @@ class Simulation:
 
     PATIENCE = 400.0  # a body that comes from rest in motion may take this many times `event_time` to crack
     SPENT = 1e-4      # of the energy at the onset: with less, a separated body is at rest
-    CHECKPOINT = "checkpoint.npz"
+    CHECKPOINT = CHECKPOINT
     ONSET = "onset.npz"
 
     def __init__(self, scene: Scene, folder: Path, display: Display, resume: bool = False,

@@ -28,6 +28,9 @@ def verdict(scene: Scene, simulation: Simulation) -> str:
     cracked = np.isfinite(tracker.cracked_at)
     even = simulation.guard.even
     quasistatic = scene.controls.analysis == "quasistatic"
+    model = str(scene.model_choice.get("model", ""))
+    if not cracked.any() and model.partition("-")[0] == "onset":
+        return f"only the onset was computed, as by the model {model}: it leaves out the crack"
     if not cracked.any():
         why = ("the body is loaded evenly, and no place of it is weaker than another; its result is the greatest load"
                if even else simulation.statics.arrested or "what has begun takes a longer event_time to run away")

@@ -149,6 +149,11 @@ class Case:
         return ({name: parameters[name] for name in names if name in parameters},
                 {name: value for name, value in parameters.items() if name not in names})
 
+    @property
+    def newer(self) -> dict[str, Any]:
+        """Arguments that a scene.toml of an earlier version has not, at their defaults."""
+        return {name: default for name, default in self.default_arguments.items() if name in NEWER}
+
     def from_stored(self, stored: StoredScene, folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:
         """The arguments of the function and the values of options of the run in a folder.
 
@@ -158,8 +163,7 @@ class Case:
             An argument of the function is not there.
         """
         arguments, values = self.divide(stored.parameters_in(folder))
-        newer = {name: default for name, default in self.default_arguments.items() if name in NEWER}
-        return {name: {**newer, **arguments}[name] for name in self.default_arguments}, values
+        return {name: {**self.newer, **arguments}[name] for name in self.default_arguments}, values
 
 
 def _message(mistake: Mistake, values: Mapping[str, Any]) -> str:

@@ -85,11 +85,11 @@ class Controls:
         backend(self.kernels)
         require("overshoot", self.overshoot, low=0, high=0.1, low_open=True)
         require("deletion", self.deletion, low=0, high=1e-2, low_open=True)
-        require("force-floor", self.force_floor, low=0, high=0.1)
+        require("force_floor", self.force_floor, low=0, high=0.1)
         for name in ("event_time", "record_every", "frame_every", "checkpoint_every"):
-            require(name.replace("_", "-"), getattr(self, name), "s", low=0, low_open=True)
+            require(name, getattr(self, name), "s", low=0, low_open=True)
         require("aftermath", self.aftermath, "s", low=0)
-        require("balance-tolerance", self.balance_tolerance, low=0, high=1, low_open=True)
+        require("balance_tolerance", self.balance_tolerance, low=0, high=1, low_open=True)
         require("threads", self.threads, low=0, high=256, whole=True)
 
     def workers(self, dim: int) -> int:

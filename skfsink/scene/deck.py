@@ -30,7 +30,8 @@ from .stored import TABLES, tables_beside
 
 __all__ = ["Deck", "read_deck"]
 
-TOP = ("case", "parameters", "source", "assumed", "choice")  # the last three a run says of itself; a deck may have them
+#: keys of a deck; the last four a run says of itself
+TOP = ("case", "parameters", "source", "assumed", "choice", "made_in_python")
 OUTPUT = ("out", "overwrite", "quiet", "resume", "observers")  # options of a run, which no deck has
 LARGEST = 1_000_000  # bytes
 
@@ -116,6 +117,9 @@ def _deck(data: Mapping[str, Any]) -> Deck:
     if not isinstance(name, str) or not isinstance(parameters, dict):
         raise ParameterError(f"case must be a name, one of {', '.join(CASES)}, and parameters a table")
     case = case or find_case(name)  # which says what there is
+    if parts := data.get("made_in_python"):
+        raise ParameterError(f"it does not describe its run, parts of which were made in Python "
+                             f"({', '.join(map(str, parts))}): run it again from there")
     if twice := parameters.keys() & {*TABLES}:
         raise ParameterError(f"{min(twice)} are tables beside the parameters: [[{min(twice)}]]")
     return Deck(name, case.read({**parameters, **{table: data.get(table, ()) for table in case.tables}}))

@@ -226,10 +226,10 @@ class Options:
     def __post_init__(self) -> None:
         for name in ("out", "resume", "corridor", "kept_mesh"):
             if (folder := getattr(self, name)) is not None:
-                object.__setattr__(self, name, path_of(name.replace("_", "-"), folder))
+                object.__setattr__(self, name, path_of(name, folder))
         object.__setattr__(self, "observers", check_observers(self.observers))
         for f in fields(self):
-            name, value = f.name.replace("_", "-"), getattr(self, f.name)
+            name, value = f.name, getattr(self, f.name)
             if isinstance(f.default, bool) and not isinstance(value, bool):
                 raise ParameterError(f"{name} must be true or false; got {value!r:.80}")
             if isinstance(f.default, str) and not isinstance(value, str):
@@ -238,7 +238,7 @@ class Options:
         require("speed", self.speed, "mm/s", low=0, low_open=True)
         require("tolerance", self.tolerance, low=0, low_open=True)
         choose("quantity", self.quantity, QUANTITIES)
-        choose("mesh-layout", self.mesh_layout, LAYOUTS)
+        choose("mesh_layout", self.mesh_layout, LAYOUTS)
         if self.dimensions not in (0, 2, 3):
             raise ParameterError(f"dimensions must be 2, 3, or 0 for those of the sample; got {self.dimensions!r}")
         self.stored_energy(), self.sink_law(), self.controls()

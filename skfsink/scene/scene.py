@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import ParameterError
+from ..errors import MeshError, ParameterError
 from ..fem.backends import backend
 from ..fem.elements import check_element
 from ..fem.space import Space
@@ -17,6 +17,7 @@ from ..loads.nodal import NodalLoads
 from ..loads.schedule import Loading
 from ..material import Material, SinkLaw
 from ..material.regions import Region, check_lengths, divided
+from ..meshing.mesh_file import one_line
 from ..meshing.sample import Sample
 from ..meshing.symmetry import Whole
 from .controls import Controls
@@ -55,7 +56,7 @@ class Scene:
     Raises
     ------
     MeshError
-        The mesh lacks the boundary of a grip.
+        The mesh lacks the boundary of a grip, or one of the faces.
     ParameterError
         The element is not for meshes of this dimension, or a region for this body.
     """
@@ -82,6 +83,11 @@ class Scene:
     def __post_init__(self) -> None:
         for boundary in (load.boundary for group in (self.grips, self.rollers, self.tractions) for load in group):
             self.sample.nodes(boundary)
+        for name in self.faces:
+            if name not in self.sample.boundaries:
+                raise MeshError(f"faces: {name!r} is no boundary of mesh {self.sample.name}, which has "
+                                f"{one_line(', '.join(sorted(self.sample.boundaries))) or 'none'}; names are parted by "
+                                f"commas")
         check_element(self.controls.element, self.sample.space, self.controls.kernels)
         backend(self.controls.kernels).check(self.sample.space)
         check_lengths(self.sink_law, self.regions)

@@ -35,6 +35,8 @@ class StoredScene:
     source: mesh file of the user's that the mesh in the folder was read from; "" for other meshes.
     assumed: statements about lengths that the paper does not print.
     model_choice: how the model was chosen; empty if it was not.
+    made_in_python: parts of the scene that the parameters do not give, such as "material" and "loads"; a run that has
+        one can be resumed, and run again, from Python only.
     """
 
     case: str
@@ -42,6 +44,7 @@ class StoredScene:
     source: str = ""
     assumed: tuple[str, ...] = ()
     model_choice: Mapping[str, Any] = field(default_factory=dict)
+    made_in_python: tuple[str, ...] = ()
 
     @classmethod
     def read(cls, folder: Path) -> StoredScene:
@@ -62,7 +65,7 @@ class StoredScene:
             return cls(str(document["case"]),
                        {**document["parameters"], **{name: document.get(name, ()) for name in tables}},
                        str(document.get("source", "")), tuple(map(str, document.get("assumed", ()))),
-                       dict(document.get("choice", {})))
+                       dict(document.get("choice", {})), tuple(map(str, document.get("made_in_python", ()))))
         except (KeyError, TypeError, ValueError, RecursionError) as error:
             raise OutputError(f"{path} is not the scene of a run: {error}") from None
 
@@ -75,7 +78,8 @@ class StoredScene:
         parameters = {k: v.item() if isinstance(v, np.generic) else v for k, v in self.parameters.items()}
         source = {"source": self.source} if self.source else {}
         choice_table = {"choice": dict(self.model_choice)} if self.model_choice else {}
-        return HEAD + tomli_w.dumps({"case": self.case, **source, **tables_beside(parameters),
+        python = {"made_in_python": list(self.made_in_python)} if self.made_in_python else {}
+        return HEAD + tomli_w.dumps({"case": self.case, **source, **python, **tables_beside(parameters),
                                      "assumed": list(self.assumed), **choice_table})
 
     def parameters_in(self, folder: Path) -> dict[str, Any]:

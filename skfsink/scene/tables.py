@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
+from numbers import Real
 from typing import Annotated, Any, get_type_hints
 
 from ..errors import ParameterError, require
@@ -111,10 +112,11 @@ def _table(item: Any) -> Any:
     return item
 
 
-def _plain(course: float | Ramp) -> Any:
+def _plain(course: Any) -> Any:
+    """The component of a table; what is no number stays as it is, for the record to read or refuse."""
     if isinstance(course, Ramp):
         return [[float(time), float(value)] for time, value in zip(course.times, course.values)]
-    return float(course)
+    return float(course) if isinstance(course, Real) and not isinstance(course, bool) else course
 
 
 def grips_of(tables: Sequence[Mapping[str, Any]], dim: int) -> tuple[Grip, ...]:

@@ -21,6 +21,8 @@ OLD = {
     **{name: f"methods.{name}" for name in ("newton", "onset", "statics", "explicit", "hht", "inertia")},
     **{name: f"results.{name}" for name in ("loader", "result", "history", "reference")},
     **{name: f"material.{name}" for name in ("homogeneous", "regions")},
+    "hht_controls": "methods.controls", "places": "run.observers.places", "checks": "run.checks",
+    "notes": "run.notes", "rigid": "loads.rigid",
     "film": "pictures.film", "guards": "run.observers.guard", "simulate": "run.simulate", "loading": "loads.schedule",
 }
 

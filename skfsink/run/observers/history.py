@@ -6,8 +6,9 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from ...errors import CheckpointError, ParameterError
+from ...results.history import HISTORY_COLUMNS, deletions_header
 from ...results.history import History as Rows
-from ...results.history import deletions_header
 from ...system.files import write_atomic
 from .observer import Observer
 from .view import View
@@ -71,8 +72,24 @@ class History(Observer):
         return self._table.rows
 
     def open(self, view: View, memory: Mapping[str, Any] | None = None) -> None:
-        """Take up the rows so far."""
+        """Take up the rows so far.
+
+        Raises
+        ------
+        ParameterError
+            A column is in one of :data:`.HISTORY_COLUMNS` and :data:`VALUES` alone.
+        CheckpointError
+            The rows so far have a column that is in neither.
+        """
+        for one, other, there in ((HISTORY_COLUMNS, VALUES, "VALUES of skfsink.run.observers.history"),
+                                  (VALUES, HISTORY_COLUMNS, "HISTORY_COLUMNS of skfsink.results.history")):
+            if alone := one.keys() - other.keys():
+                raise ParameterError(f"the column {min(alone)} of the history is not in {there}: enter it in both")
         self._kept = memory["rows"] if memory is not None else []
+        if unknown := {name for row in self._kept for name in row} - HISTORY_COLUMNS.keys():
+            raise CheckpointError(f"the run in {view.folder} has the column {min(unknown)} in its history, which is "
+                                  f"not known here: resume it from Python, with the column in HISTORY_COLUMNS and "
+                                  f"VALUES")
 
     def prepare(self, view: View) -> None:
         """Begin the file with the rows so far."""
