@@ -124,7 +124,7 @@ def test_history_of_states_that_are_no_equilibria_fails_the_body():
     assert moved["lost"] > 0.2 and moved["deleted"] > 0.1
     assert once["lost"] > 0.1
     assert found["lost"] < 1e-3 and found["deleted"] == 0
-    with pytest.raises(ParameterError, match="static-tolerance must be"):
+    with pytest.raises(ParameterError, match="static_tolerance must be"):
         StaticsControls(tolerance=0.02)
 
 
