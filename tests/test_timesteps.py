@@ -61,18 +61,53 @@ def test_run_continues_to_the_same_bits(fracture: Fracture, name: str, before: i
     assert one.dt == two.dt
 
 
-def test_explicit_says_when_it_has_blown_up(fracture: Fracture):
-    """Fails if a run with too long a step goes on with infinite energies."""
+def too_long(fracture: Fracture, energy_tolerance: float) -> tuple[Explicit, State]:
+    """A scheme whose steps are one and a half times the limit, and the state at the onset."""
     fresh, momentum, density, free, velocity = fracture
     state = fresh()
-    explicit = Explicit(held_body(momentum, density, free, velocity), ExplicitControls(gamma_every=10**6))
+    explicit = Explicit(held_body(momentum, density, free, velocity),
+                        ExplicitControls(gamma_every=10**6, energy_tolerance=energy_tolerance))
     explicit.begin(state)
-    explicit._set_step(state)
-    explicit.dt *= 1.5
-    explicit._set_step = lambda state: None
-    with pytest.raises(InstabilityError, match=r"blew up .* lower courant"), np.errstate(all="ignore"):
+    explicit.length.look(0, state.u, explicit.mass, explicit._inverse)
+    explicit.length.fix(1.5 * explicit.dt)
+    return explicit, state
+
+
+def test_steps_beyond_the_limit_are_cut(fracture: Fracture):
+    """Fails if steps that feed in energy are taken: with a tolerance of 1 the same steps end the run."""
+    explicit, state = too_long(fracture, 1.0)
+    with np.errstate(all="ignore"), pytest.raises(InstabilityError):
+        for _ in range(60):
+            explicit.step(state)
+    explicit, state = too_long(fracture, ExplicitControls.energy_tolerance)
+    for _ in range(400):
+        explicit.step(state)
+    assert explicit.rejected > 5 and abs(state.ledger.numerical) < 1e-3 * state.ledger.initial
+    assert explicit.dt < explicit.length.fixed
+
+
+def test_a_rejected_step_leaves_no_trace(fracture: Fracture):
+    """Fails if what follows a rejected step depends on it: the fields, the ledger, the load time."""
+    states = []
+    for dt in (1.0, 0.5):
+        explicit, state = too_long(fracture, ExplicitControls.energy_tolerance)
+        explicit.length.fix(dt * 1e-4)  # 1e-4 s is rejected again and again; so is half of it, once less
+        explicit.step(state)
+        states.append((explicit, state))
+    (one, first), (other, second) = states
+    assert one.rejected == other.rejected + 1 > 5 and one.dt == other.dt
+    for name in ("u", "v", "a", "W_max", "gamma"):
+        np.testing.assert_array_equal(getattr(first, name), getattr(second, name))
+    assert first.ledger == second.ledger and first.grip == second.grip and first.time == second.time
+
+
+def test_explicit_says_where_no_step_is_short_enough(fracture: Fracture):
+    """Fails if a scheme that cannot keep the energy halves its step for ever, or does not say where."""
+    explicit, state = too_long(fracture, 1e-18)
+    with pytest.raises(InstabilityError, match=r"no explicit step down to .* near \(.*\) mm .* take --integrator hht$"):
         for _ in explicit.run(state, 1.0):
             assert state.step <= 400
+    assert np.isfinite(state.u).all() and np.isfinite(state.ledger.elastic)
 
 
 def test_step_follows_the_deformed_state():
