@@ -14,7 +14,7 @@ from skfsink.fields.density import Density, DensitySolver
 from skfsink.fields.momentum import Momentum
 from skfsink.fields.state import State
 from skfsink.material import AAA, SinkLaw
-from skfsink.methods.controls import ExplicitControls, HHTControls
+from skfsink.methods.controls import ENERGY_TOLERANCE, ExplicitControls, HHTControls
 from skfsink.methods.explicit import Explicit
 from skfsink.methods.hht import HHT
 
@@ -79,7 +79,7 @@ def test_steps_beyond_the_limit_are_cut(fracture: Fracture):
     with np.errstate(all="ignore"), pytest.raises(InstabilityError):
         for _ in range(60):
             explicit.step(state)
-    explicit, state = too_long(fracture, ExplicitControls.energy_tolerance)
+    explicit, state = too_long(fracture, ENERGY_TOLERANCE)
     for _ in range(400):
         explicit.step(state)
     assert explicit.rejected > 5 and abs(state.ledger.numerical) < 1e-3 * state.ledger.initial
@@ -90,7 +90,7 @@ def test_a_rejected_step_leaves_no_trace(fracture: Fracture):
     """Fails if what follows a rejected step depends on it: the fields, the ledger, the load time."""
     states = []
     for dt in (1.0, 0.5):
-        explicit, state = too_long(fracture, ExplicitControls.energy_tolerance)
+        explicit, state = too_long(fracture, ENERGY_TOLERANCE)
         explicit.length.fix(dt * 1e-4)  # 1e-4 s is rejected again and again; so is half of it, once less
         explicit.step(state)
         states.append((explicit, state))
@@ -99,6 +99,15 @@ def test_a_rejected_step_leaves_no_trace(fracture: Fracture):
     for name in ("u", "v", "a", "W_max", "gamma"):
         np.testing.assert_array_equal(getattr(first, name), getattr(second, name))
     assert first.ledger == second.ledger and first.grip == second.grip and first.time == second.time
+
+
+def test_explicit_says_when_it_has_blown_up(fracture: Fracture):
+    """Fails if a run with too long a step, of which none is rejected, goes on with infinite energies."""
+    explicit, state = too_long(fracture, 0.0)
+    with pytest.raises(InstabilityError, match=r"blew up .* lower courant"), np.errstate(all="ignore"):
+        for _ in explicit.run(state, 1.0):
+            assert state.step <= 400
+    assert np.isfinite(state.ledger.elastic)
 
 
 def test_explicit_says_where_no_step_is_short_enough(fracture: Fracture):

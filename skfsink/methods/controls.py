@@ -7,10 +7,12 @@ from typing import Protocol
 
 from ..errors import ParameterError, require
 
-__all__ = ["COUPLINGS", "MASSES", "EventControls", "ExplicitControls", "HHTControls", "StaticsControls"]
+__all__ = ["COUPLINGS", "ENERGY_TOLERANCE", "MASSES", "EventControls", "ExplicitControls", "HHTControls",
+           "StaticsControls"]
 
 COUPLINGS = ("iterated", "single")
 MASSES = ("lumped", "consistent")
+ENERGY_TOLERANCE = 2e-5  #: of an explicit step, that serves for all laws at their own strength
 
 
 @dataclass(frozen=True)
@@ -24,8 +26,8 @@ class ExplicitControls:
     mass_floor: least lumped mass, as a fraction of the intact one, in [0, 1).
     estimate_every: steps after which omega_max is estimated again at the latest, >= 1.
     estimate_change: relative change of the cheap indicator that calls for a new estimate, in (0, 1).
-    energy_tolerance: energy that a step may feed in or take out, of that of the body, in (0, 1]; else it is made again
-        half as long.
+    energy_tolerance: energy that a step may feed in or take out, of that of the body, in [0, 1]; else it is made again
+        half as long. 0: no step is rejected, and one that feeds in energy calls for a new estimate of the limit.
     """
 
     courant: float = 0.8
@@ -33,7 +35,7 @@ class ExplicitControls:
     mass_floor: float = 1e-3
     estimate_every: int = 400
     estimate_change: float = 0.05
-    energy_tolerance: float = 2e-5
+    energy_tolerance: float = 0.0
 
     def __post_init__(self) -> None:
         require("courant", self.courant, low=0, high=1, low_open=True)
@@ -41,7 +43,7 @@ class ExplicitControls:
         require("mass_floor", self.mass_floor, low=0, high=1, high_open=True)
         require("estimate_every", self.estimate_every, "steps", low=1, whole=True)
         require("estimate_change", self.estimate_change, low=0, high=1, low_open=True, high_open=True)
-        require("energy_tolerance", self.energy_tolerance, low=0, high=1, low_open=True)
+        require("energy_tolerance", self.energy_tolerance, low=0, high=1)
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,7 @@ from ..fields.deletion import delete_failed, left_in
 from ..fields.density import Density
 from ..fields.state import State
 from ..system.jit import njit
-from .controls import EventControls, ExplicitControls
+from .controls import ENERGY_TOLERANCE, EventControls, ExplicitControls
 from .step_length import StepLength
 
 __all__ = ["Explicit"]
@@ -148,7 +148,10 @@ class Explicit:
         energy_fed_in = dt * dt / 8 * swing + (elastic - self._elastic) - trapezoid
         if dead is not None and before is not None:
             energy_fed_in -= dead.effort(before, du)
-        if not self.length.accepts(energy_fed_in, max(abs(ledger.initial), elastic + kinetic, self.body.least_energy)):
+        energy, initial = max(abs(ledger.initial), elastic + kinetic, self.body.least_energy), ledger.initial
+        if dead is not None:
+            initial = max(abs(initial), elastic + kinetic)
+        if not self.length.accepts(energy_fed_in, energy, initial):
             self.momentum.set_time(state.grip)
             return False
         self._next = state.u, state.v, state.a
@@ -169,6 +172,10 @@ class Explicit:
 
     def _give_up(self, state: State) -> None:
         """The step that was tried last left its velocities in `_next`."""
+        if self.controls.energy_tolerance == 0.0:
+            raise InstabilityError(
+                f"the explicit integration blew up at t = {state.time:.4g} s (step {state.step}): lower courant, now "
+                f"{self.controls.courant:g}, or reject such steps by an energy_tolerance of {ENERGY_TOLERANCE:g}")
         speed = np.abs(np.nan_to_num(self._next[1], nan=np.inf)).max(axis=1)
         raise InstabilityError(
             f"no explicit step down to {self.length.dt:.2g} s keeps the energy of the body to "
