@@ -21,6 +21,7 @@ from skfsink.methods.hht import HHT
 MAKERS: dict[str, Callable] = {
     "explicit": lambda *args: Explicit(held_body(*args), ExplicitControls(gamma_every=4)),
     "explicit, interval of gamma by itself": lambda *args: Explicit(held_body(*args)),
+    "explicit, steps rejected": lambda *args: Explicit(held_body(*args), ExplicitControls(energy_tolerance=2e-6)),
     "hht": lambda *args: HHT(held_body(*args), HHTControls(dt=2e-7)),
     "hht, single pass": lambda *args: HHT(held_body(*args), HHTControls(dt=2e-7, coupling="single")),
 }
@@ -41,6 +42,7 @@ def test_run_continues_to_the_same_bits(fracture: Fracture, name: str, before: i
     for _ in range(before):
         one.step(state)
     one.sync(state)
+    assert (one.rejected > 0) == (name == "explicit, steps rejected") or "hht" in name
     saved = copy.deepcopy((state, one.memory()))
     for _ in range(40):
         one.step(state)
