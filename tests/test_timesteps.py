@@ -53,7 +53,7 @@ def test_run_continues_to_the_same_bits(fracture: Fracture, name: str, before: i
         two.step(resumed)
     one.sync(state)
     two.sync(resumed)
-    assert state.gamma.min() < 0.5
+    assert state.gamma.min() < (0.8 if "rejected" in name else 0.5)
     for field in ("u", "v", "a", "gamma", "W_max", "deleted"):
         np.testing.assert_array_equal(getattr(state, field), getattr(resumed, field), err_msg=field)
     assert (state.time, state.step, state.grip, state.deletions) == \
