@@ -21,6 +21,7 @@ from ...material.crushed import J_FLOOR
 from ...system.jit import njit
 from ..pattern import Pattern
 from ..space import Space
+from .lanes import crush_factor
 from .pieces import pieces
 from .records import Solid
 from .tangent import ERSATZ_STIFFNESS, PART, SOFT_GAMMA, parts
@@ -167,7 +168,7 @@ def _make(dim: int) -> Callable[..., Any]:
         K, A, T = np.empty((nd, nd)), np.empty((n2, n2)), np.empty((n2, dim))
         F, G, b = np.zeros((na, 3, 3)), np.empty((na, 3, 3)), np.empty(nd)
         C, B, X, n = np.empty((3, 3)), np.empty((3, 3)), np.empty((m, 3, 3)), np.zeros((na, m, 2, 3))
-        J, J_e, tr, R, psi = np.empty(na), np.empty(na), np.empty(na), np.empty(na), np.empty(na)
+        J, tr, R, psi = np.empty(na), np.empty(na), np.empty(na), np.empty(na)
         I, d, dd = np.empty((m, na)), np.zeros((m, na)), np.zeros((m, m, na))
         F[:, 2, 2] = 1.0
         for e in range(conn.shape[0]):
@@ -183,10 +184,9 @@ def _make(dim: int) -> Callable[..., Any]:
                         F[q, i, j] = s
                 _cofactor(F[q], G[q])
                 J[q] = F[q, 0, 0] * G[q, 0, 0] + F[q, 0, 1] * G[q, 0, 1] + F[q, 0, 2] * G[q, 0, 2]
-                floored = max(J[q], J_FLOOR)
-                s = 1.0 + 2 / 3.0 * (1.0 - J[q] / J_FLOOR) if J[q] < J_FLOOR else 1.0
-                R[q] = floored ** (-2.0 / 3.0) * s
-                J_e[q] = floored * s
+                R[q] = max(J[q], J_FLOOR) ** (-2.0 / 3.0)
+                if J[q] < J_FLOOR:
+                    R[q] *= crush_factor(J[q])
                 t, second = 0.0, 0.0
                 for i in range(3):
                     for j in range(3):
@@ -209,7 +209,9 @@ def _make(dim: int) -> Callable[..., Any]:
                         for j in range(dim):
                             s += G[q, i, j] * dN[e, q, a, j]
                         b[dim * a + i] += w[e, q] * s
-                G[q] /= J_e[q]
+                G[q] /= max(J[q], J_FLOOR)
+                if J[q] < J_FLOOR:
+                    G[q] /= crush_factor(J[q])
                 V += w[e, q]
                 mean += w[e, q] * J[q]
                 gamma_bar += w[e, q] * gamma[e, q]
@@ -223,7 +225,9 @@ def _make(dim: int) -> Callable[..., Any]:
                 if j_bar:
                     pressure, volume = w[e, q] * gamma_bar * k_bulk * (mean - 1.0) * J[q], 0.0
                 else:
-                    pressure, volume = wg * k_bulk * (J[q] - 1.0) * J[q], wg * k_bulk * J_e[q] ** 2
+                    pressure, volume = wg * k_bulk * (J[q] - 1.0) * J[q], wg * k_bulk * max(J[q], J_FLOOR) ** 2
+                    if J[q] < J_FLOOR:
+                        volume *= crush_factor(J[q]) ** 2
                 _slopes(F[q], G[q], C, B, n[q], tr[q], X)
                 _modulus(dim, F[q], G[q], C, B, n[q], tr[q], R[q], I[:, q], d[:, q], dd[:, :, q], X, wg, pressure,
                          volume, A)

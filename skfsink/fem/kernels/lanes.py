@@ -38,6 +38,12 @@ def refine_inverse_cbrt(J, r):  # type: ignore[no-untyped-def]
         J[i] = s * s * s
 
 
+@njit
+def crush_factor(J):  # type: ignore[no-untyped-def]
+    """The factor s of a crushed point, see :mod:`.crushed`."""
+    return 1.0 + 2 / 3.0 * (1.0 - J / J_FLOOR)
+
+
 @njit(fastmath=FAST)
 def continue_below_floor(J, inverse, R):  # type: ignore[no-untyped-def]
     """R = J^(-2/3) and 1/J, found at `J_FLOOR` where J is below it, to what they are there; see :mod:`.crushed`."""
@@ -46,6 +52,6 @@ def continue_below_floor(J, inverse, R):  # type: ignore[no-untyped-def]
         least = J[i] if J[i] < least else least
     if least < J_FLOOR:
         for i in range(J.size):
-            s = 1.0 + 2 / 3.0 * (1.0 - J[i] / J_FLOOR) if J[i] < J_FLOOR else 1.0
-            R[i] *= s
-            inverse[i] /= s
+            if J[i] < J_FLOOR:
+                R[i] *= crush_factor(J[i])
+                inverse[i] /= crush_factor(J[i])

@@ -27,6 +27,7 @@ from ...material.crushed import J_FLOOR
 from ...system.jit import njit
 from ..pattern import Pattern
 from ..space import Space
+from .lanes import crush_factor
 from .pieces import pieces
 from .records import Solid
 
@@ -160,7 +161,7 @@ def _make(dim: int) -> Callable[..., Any]:
         K, b = np.empty((nd, nd)), np.empty(nd)
         g, nf, Az = np.empty((na, nd)), np.empty((na, nd)), np.empty((2, nd))
         F, G = np.empty((3, 3)), np.empty((3, 3))
-        J, J_e, tr, I1, R = np.empty(na), np.empty(na), np.empty(na), np.empty(na), np.empty(na)
+        J, tr, I1, R = np.empty(na), np.empty(na), np.empty(na), np.empty(na)
         least = np.empty(na)
         psi, dpsi, ddpsi = np.empty(na), np.empty(na), np.empty(na)
         for e in range(conn.shape[0]):
@@ -178,11 +179,12 @@ def _make(dim: int) -> Callable[..., Any]:
                 J[q] = det
                 tr[q] = t
                 floored = max(det, J_FLOOR)
-                s = 1.0 + 2 / 3.0 * (1.0 - det / J_FLOOR) if det < J_FLOOR else 1.0
-                R[q] = floored ** (-2.0 / 3.0) * s
-                J_e[q] = floored * s
+                R[q] = floored ** (-2.0 / 3.0)
+                if det < J_FLOOR:
+                    R[q] *= crush_factor(det)
+                    floored *= crush_factor(det)  # J_e
                 if convex:  # least product of two stretches that the deformation can turn
-                    least[q] = J_e[q] if dim == 2 else J_e[q] / np.sqrt(_greatest(F, t))
+                    least[q] = floored if dim == 2 else floored / np.sqrt(_greatest(F, t))
                 I1[q] = R[q] * t
                 for a in range(na):
                     for i in range(dim):
@@ -191,7 +193,7 @@ def _make(dim: int) -> Callable[..., Any]:
                             s += G[i, j] * dN[e, q, a, j]
                             r += F[i, j] * dN[e, q, a, j]
                         b[dim * a + i] += w[e, q] * s
-                        g[q, dim * a + i] = s / J_e[q]
+                        g[q, dim * a + i] = s / floored
                         nf[q, dim * a + i] = r
                 V += w[e, q]
                 mean += w[e, q] * det
@@ -208,7 +210,9 @@ def _make(dim: int) -> Callable[..., Any]:
                 if j_bar:
                     wpJ, wkJJ = w[e, q] * gamma_bar * k_bulk * (mean - 1.0) * J[q], 0.0
                 else:
-                    wpJ, wkJJ = wg * k_bulk * (J[q] - 1.0) * J[q], wg * k_bulk * J_e[q] ** 2
+                    wpJ, wkJJ = wg * k_bulk * (J[q] - 1.0) * J[q], wg * k_bulk * max(J[q], J_FLOOR) ** 2
+                    if J[q] < J_FLOOR:
+                        wkJJ *= crush_factor(J[q]) ** 2
                 if convex:
                     middle, reach = 2.0 / 3.0 * tr[q] * c1, 2.0 * c1 * least[q]
                     wpJ = min(max(wpJ, middle - reach), middle + reach)
