@@ -25,6 +25,7 @@ RATIOS = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 138.0)   # Phi/mu; the last is that of
 COURANTS = (0.1, 0.2, 0.4, 0.8, 1.0)
 STEPS = (0.04, 0.16, 0.64)                         # of HHT [us]
 END = 20e-6                                        # of the events [s]
+NAMES = {"explicit": "Explicit", "hht": "HHT"}
 LOST = 0.05                                        # of the energy at the start, at which a run would be stopped
 
 
@@ -91,16 +92,18 @@ def draw_strength(axes: Sequence[Axes], points: Points) -> None:
         key = "courant" if scheme == "explicit" else "dt_us"
         mine = [p for p in points.values() if p.get("scheme") == scheme]
         shown = [p for p in mine if p["rejects"]]
-        map_ = ax.scatter([p["ratio"] for p in shown], [p[key] for p in shown],
-                          c=[min(max(p["lost"], 1e-5), 1.0) for p in shown], norm=LogNorm(1e-5, 1), cmap="viridis_r",
-                          marker="s", s=90)
+        drawn = ax.scatter([p["ratio"] for p in shown], [p[key] for p in shown],
+                           c=[min(max(p["lost"], 1e-5), 1.0) for p in shown], norm=LogNorm(1e-5, 1), cmap="viridis_r",
+                           marker="s", s=90)
         for rejects, mark, name in ((False, "x", "fails without rejected steps"), (True, "o", "fails with them")):
             failed = [p for p in mine if p["rejects"] is rejects and (p["why"] or p["lost"] > LOST)]
-            ax.plot([p["ratio"] for p in failed], [p[key] for p in failed], mark, color=RED, markersize=5,
-                    fillstyle="none", label=name)
-        ax.set(xscale="log", xlabel=r"$\Phi/\mu$", title=f"{scheme}: strong materials",
-               ylabel="Courant number" if key == "courant" else "largest step (µs)", ylim=(0, None))
-        if key == "dt_us":
-            ax.set(yscale="log", ylim=(0.02, 2))
-        ax.legend(loc="upper left", bbox_to_anchor=(0.0, -0.22), ncols=2, frameon=False)
-        ax.figure.colorbar(map_, ax=ax, label="energy fed in or lost", pad=0.02)
+            if failed:
+                ax.plot([p["ratio"] for p in failed], [p[key] for p in failed], mark, color=RED, markersize=5,
+                        fillstyle="none", label=name)
+        ax.set(xscale="log", xlabel=r"$\Phi/\mu$", title=f"{NAMES[scheme]}: strong materials")
+        if key == "courant":
+            ax.set(ylabel="Courant number", ylim=(0, 1.3))
+        else:
+            ax.set(ylabel="largest step (µs)", yscale="log", ylim=(0.02, 3))
+        ax.legend(loc="upper left")
+        ax.figure.colorbar(drawn, ax=ax, label="energy fed in or lost", pad=0.02)
