@@ -110,7 +110,8 @@ def test_options_are_those_of_the_laws_and_controls() -> None:
 def test_options_reach_what_they_are_named_after(kind: Any, option_of: dict[str, str]) -> None:
     """Fails if an option is not handed to the control or the law that has it, or two options change places."""
     changed = Options(
-        courant=0.5, gamma_every=3, mass_floor=0.01, hht_alpha=-0.1, hht_dt=1e-7, coupling="single", mass="consistent",
+        courant=0.5, gamma_every=3, energy_tolerance=1e-4, mass_floor=0.01, hht_alpha=-0.1, hht_dt=1e-7,
+            coupling="single", mass="consistent",
         front=0.7, analysis="both", integrator="hht", sink="nearest", element="plain", overshoot=0.01, deletion=1e-5,
         force_floor=0.01, event_time=1e-4, aftermath=2e-5, record_every=2e-6, frame_every=3e-6, balance_tolerance=0.1,
         checkpoint_every=10.0, threads=2, active_zone=False, phi=0.2, m=8.0, length_scale=0.2, c1=0.5, c2=1.0,

@@ -15,7 +15,7 @@ from skfsink.fem.indicators import alternation, inverted, turning
 from skfsink.fem.space import Space
 from skfsink.methods.controls import ExplicitControls, HHTControls, StaticsControls
 from skfsink.scene.controls import Controls
-from skfsink.study import stability_elements, stability_onset, stability_time
+from skfsink.study import stability_elements, stability_onset, stability_strength, stability_time
 from skfsink.study.blocks import block
 from skfsink.study.stability import stability
 
@@ -164,3 +164,18 @@ def test_turning_of_a_surface_in_space():
     angle, place = turning(Space(whole.remove_elements(np.flatnonzero((x < 0.3) & (y < 0.3)))))
     assert angle == pytest.approx(90.0)
     np.testing.assert_allclose(place[:2], 1 / 3)
+
+
+@pytest.mark.parametrize(("ratio", "courant"), [(0.1, 1.0), (138.0, 0.8)])
+def test_strong_materials_need_rejected_steps(ratio: float, courant: float):
+    """Fails if explicit steps that feed in energy are not rejected: beyond the limit, and where elements turn over."""
+    kept, lost = (stability_strength.explicit_event(ratio, courant, rejects) for rejects in (True, False))
+    assert kept["why"] == "" and kept["lost"] < 1e-3 and 0 < kept["rejected"] < 0.1 * kept["steps"]
+    assert kept["ended_us"] >= 20.0 and kept["gamma_inside_out"] < 0.5
+    assert lost["rejected"] == 0 and lost["lost"] > 0.05
+
+
+def test_hht_steps_that_feed_in_energy_are_halved():
+    """Fails if HHT takes a step in which the elements of a strong material turn over, and keeps what it feeds in."""
+    kept, lost = (stability_strength.hht_event(138.0, 0.16, rejects) for rejects in (True, False))
+    assert kept["why"] == "" and kept["lost"] < 0.03 < 0.1 < lost["lost"]

@@ -15,26 +15,37 @@ from skfsink.fields.density import DensitySolver
 from skfsink.fields.energy import Ledger
 from skfsink.fields.state import State
 from skfsink.material import SinkLaw
-from skfsink.methods.controls import ExplicitControls, HHTControls, StaticsControls
-from skfsink.methods.explicit import Explicit
+from skfsink.methods.controls import ENERGY_TOLERANCE, ExplicitControls, HHTControls, StaticsControls
 from skfsink.methods.statics import Statics
+from skfsink.methods.step_length import StepLength
 from skfsink.run.display import Display
 from skfsink.run.simulate import Loaded, Simulation
 from skfsink.run.summarize import summarize
 from skfsink.study.plate import Plate
 
 
-def test_too_long_a_step_stops_the_run_with_the_cure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """Fails if a run whose step is too long goes on to NaN, or ends with an error that names no cure."""
-    step = Explicit._set_step
+@pytest.mark.parametrize("tolerance", [ENERGY_TOLERANCE, 0.0])
+def test_too_long_a_step_is_cut_or_stops_the_run_with_the_cure(tolerance: float, tmp_path: Path,
+                                                               monkeypatch: pytest.MonkeyPatch):
+    """Fails if a run whose step is too long goes on to NaN, or ends with an error that names no cure.
 
-    def longer(self: Explicit, state: State) -> None:
-        step(self, state)
-        self.dt *= 1.4 / 0.8
-    monkeypatch.setattr(Explicit, "_set_step", longer)
-    sim = event(tmp_path)
-    with np.errstate(all="ignore"), pytest.raises(InstabilityError, match=r"energy fed in .* lower --courant"):
+    Such steps are cut; where that is turned off the guard ends the run.
+    """
+    look = StepLength.look
+
+    def longer(self: StepLength, *arguments: Any) -> None:
+        look(self, *arguments)
+        self.dt = 1.4 / 0.8 * self.dt
+    monkeypatch.setattr(StepLength, "look", longer)
+    monkeypatch.setattr(StepLength, "CHECK", 1)
+    sim = event(tmp_path, explicit=ExplicitControls(energy_tolerance=tolerance))
+    if tolerance == 0.0:
+        with np.errstate(all="ignore"), pytest.raises(InstabilityError, match=r"energy fed in .* lower --courant"):
+            sim.run(Loaded(NOTCHED.onset))
+    else:
         sim.run(Loaded(NOTCHED.onset))
+        assert abs(sim.state.ledger.numerical) < 1e-3 * sim.state.ledger.initial
+        assert sim.integrator is not None and sim.integrator.rejected > 5
     assert np.isfinite(sim.state.u).all() and sim.state.gamma.min() > 0.0
 
 

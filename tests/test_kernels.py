@@ -16,7 +16,7 @@ from skfsink.fem.pattern import Pattern
 from skfsink.fem.space import Space
 from skfsink.fields.density import DensitySolver
 from skfsink.fields.momentum import Momentum
-from skfsink.material import AAA, NeoHookean, SinkLaw
+from skfsink.material import AAA, Material, MooneyRivlin, NeoHookean, SinkLaw
 
 ROUNDING = 1e-12
 both_elements = pytest.mark.parametrize("element", ["jbar", "plain"])
@@ -332,3 +332,30 @@ def test_threads_do_not_change_a_bit(kind: str, monkeypatch: pytest.MonkeyPatch)
     assert body.threads == min(2, numba.config.NUMBA_NUM_THREADS)
     monkeypatch.undo()
     assert kernels.Tiles(space, threads=2).threads == 1  # too small to be shared
+
+
+@pytest.mark.parametrize("element", ["jbar", "plain"])
+@pytest.mark.parametrize("material", [AAA(), MooneyRivlin()], ids=lambda value: type(value).__name__)
+def test_a_crushed_point_is_driven_back(kind: str, element: str, material: Material) -> None:
+    """Fails if the force is not the derivative of the energy where points are flat or inside out, or pulls on them.
+
+    One node is moved through its elements: J goes from 1 over 0 to -2 there. Seen to fail where J is read as its floor.
+    """
+    space = box(kind, 3 if kind == "quad" else 2, 0.0)
+    momentum = Momentum(space, material, element)
+    node = int(np.argmin(np.linalg.norm(space.X - space.X.mean(axis=0) + 0.01, axis=1)))
+    away = np.zeros_like(space.X)
+    away[node] = 1.0
+
+    def energy(way: float) -> tuple[float, float]:
+        force = momentum.force(way * away)
+        return momentum.energy, float(force[node].sum())
+
+    least = []
+    for way in np.linspace(0.0, 1.2, 25):
+        _, slope = energy(way)
+        least.append(momentum.least_J)
+        expected = (energy(way + 1e-7)[0] - energy(way - 1e-7)[0]) / 2e-7
+        assert slope == pytest.approx(expected, rel=1e-5, abs=1e-6)
+        assert way == 0.0 or slope > 0.0
+    assert min(least) < -1.0 and any(abs(J) < 0.2 for J in least)

@@ -14,13 +14,14 @@ from skfsink.fields.density import Density, DensitySolver
 from skfsink.fields.momentum import Momentum
 from skfsink.fields.state import State
 from skfsink.material import AAA, SinkLaw
-from skfsink.methods.controls import ExplicitControls, HHTControls
+from skfsink.methods.controls import ENERGY_TOLERANCE, ExplicitControls, HHTControls
 from skfsink.methods.explicit import Explicit
 from skfsink.methods.hht import HHT
 
 MAKERS: dict[str, Callable] = {
     "explicit": lambda *args: Explicit(held_body(*args), ExplicitControls(gamma_every=4)),
     "explicit, interval of gamma by itself": lambda *args: Explicit(held_body(*args)),
+    "explicit, steps rejected": lambda *args: Explicit(held_body(*args), ExplicitControls(energy_tolerance=2e-6)),
     "hht": lambda *args: HHT(held_body(*args), HHTControls(dt=2e-7)),
     "hht, single pass": lambda *args: HHT(held_body(*args), HHTControls(dt=2e-7, coupling="single")),
 }
@@ -41,6 +42,7 @@ def test_run_continues_to_the_same_bits(fracture: Fracture, name: str, before: i
     for _ in range(before):
         one.step(state)
     one.sync(state)
+    assert (one.rejected > 0) == (name == "explicit, steps rejected") or "hht" in name
     saved = copy.deepcopy((state, one.memory()))
     for _ in range(40):
         one.step(state)
@@ -51,7 +53,7 @@ def test_run_continues_to_the_same_bits(fracture: Fracture, name: str, before: i
         two.step(resumed)
     one.sync(state)
     two.sync(resumed)
-    assert state.gamma.min() < 0.5
+    assert state.gamma.min() < (0.8 if "rejected" in name else 0.5)
     for field in ("u", "v", "a", "gamma", "W_max", "deleted"):
         np.testing.assert_array_equal(getattr(state, field), getattr(resumed, field), err_msg=field)
     assert (state.time, state.step, state.grip, state.deletions) == \
@@ -61,18 +63,62 @@ def test_run_continues_to_the_same_bits(fracture: Fracture, name: str, before: i
     assert one.dt == two.dt
 
 
-def test_explicit_says_when_it_has_blown_up(fracture: Fracture):
-    """Fails if a run with too long a step goes on with infinite energies."""
+def too_long(fracture: Fracture, energy_tolerance: float) -> tuple[Explicit, State]:
+    """A scheme whose steps are one and a half times the limit, and the state at the onset."""
     fresh, momentum, density, free, velocity = fracture
     state = fresh()
-    explicit = Explicit(held_body(momentum, density, free, velocity), ExplicitControls(gamma_every=10**6))
+    explicit = Explicit(held_body(momentum, density, free, velocity),
+                        ExplicitControls(gamma_every=10**6, energy_tolerance=energy_tolerance))
     explicit.begin(state)
-    explicit._set_step(state)
-    explicit.dt *= 1.5
-    explicit._set_step = lambda state: None
+    explicit.length.look(0, state.u, explicit.mass, explicit._inverse)
+    explicit.length.fix(1.5 * explicit.dt)
+    return explicit, state
+
+
+def test_steps_beyond_the_limit_are_cut(fracture: Fracture):
+    """Fails if steps that feed in energy are taken: with a tolerance of 1 the same steps end the run."""
+    explicit, state = too_long(fracture, 1.0)
+    with np.errstate(all="ignore"), pytest.raises(InstabilityError):
+        for _ in range(60):
+            explicit.step(state)
+    explicit, state = too_long(fracture, ENERGY_TOLERANCE)
+    for _ in range(400):
+        explicit.step(state)
+    assert explicit.rejected > 5 and abs(state.ledger.numerical) < 1e-3 * state.ledger.initial
+    assert explicit.dt < explicit.length.fixed
+
+
+def test_a_rejected_step_leaves_no_trace(fracture: Fracture):
+    """Fails if what follows a rejected step depends on it: the fields, the ledger, the load time."""
+    states = []
+    for dt in (1.0, 0.5):
+        explicit, state = too_long(fracture, ENERGY_TOLERANCE)
+        explicit.length.fix(dt * 1e-4)  # 1e-4 s is rejected again and again; so is half of it, once less
+        explicit.step(state)
+        states.append((explicit, state))
+    (one, first), (other, second) = states
+    assert one.rejected == other.rejected + 1 > 5 and one.dt == other.dt
+    for name in ("u", "v", "a", "W_max", "gamma"):
+        np.testing.assert_array_equal(getattr(first, name), getattr(second, name))
+    assert first.ledger == second.ledger and first.grip == second.grip and first.time == second.time
+
+
+def test_explicit_says_when_it_has_blown_up(fracture: Fracture):
+    """Fails if a run with too long a step, of which none is rejected, goes on with infinite energies."""
+    explicit, state = too_long(fracture, 0.0)
     with pytest.raises(InstabilityError, match=r"blew up .* lower courant"), np.errstate(all="ignore"):
         for _ in explicit.run(state, 1.0):
             assert state.step <= 400
+    assert np.isfinite(state.ledger.elastic)
+
+
+def test_explicit_says_where_no_step_is_short_enough(fracture: Fracture):
+    """Fails if a scheme that cannot keep the energy halves its step for ever, or does not say where."""
+    explicit, state = too_long(fracture, 1e-18)
+    with pytest.raises(InstabilityError, match=r"no explicit step down to .* near \(.*\) mm .* take --integrator hht$"):
+        for _ in explicit.run(state, 1.0):
+            assert state.step <= 400
+    assert np.isfinite(state.u).all() and np.isfinite(state.ledger.elastic)
 
 
 def test_step_follows_the_deformed_state():

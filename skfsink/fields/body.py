@@ -133,6 +133,11 @@ class Body:
         """Greatest extent along an axis [mm]."""
         return float(np.ptp(self.space.X, axis=0).max())
 
+    @property
+    def least_energy(self) -> float:
+        """Energy [N mm; N mm/mm in 2D] below which rounding is seen: 1e-6 of what a crack takes as it runs by l."""
+        return 1e-6 * self.density.law.phi * self.density.law.length_scale ** self.space.dim
+
     def take(self, state: State) -> np.ndarray:
         """Bring the momentum balance to load time, density and displacement of a state; its force less dead loads."""
         self.momentum.set_time(state.grip)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..fem.kernels.lanes import J_FLOOR
 from ..material import GeneralMaterial
+from ..material.crushed import J_FLOOR
 from .momentum import Momentum, Part
 
 __all__ = ["cauchy_stress", "pressure", "principal_stresses", "von_mises"]

@@ -24,6 +24,7 @@ from ..errors import require
 from ..system.jit import njit
 from .base import Material
 from .compiled import GENERAL_LAW, CompiledLaw
+from .crushed import crushed
 
 __all__ = ["GeneralMaterial", "MooneyRivlin"]
 
@@ -71,17 +72,17 @@ class GeneralMaterial(Material):
         return psi + 0.5 * self.bulk_modulus * ((J if J_bar is None else J_bar) - 1) ** 2
 
     def isochoric_energy(self, F: np.ndarray, floor: float = 0.0, fibres: np.ndarray | None = None) -> np.ndarray:
-        """Stored energy psi alone [MPa], (...); J below `floor` is read as this."""
+        """Stored energy psi alone [MPa], (...); a point with J below `floor` is crushed."""
         return self.isochoric(self._invariants(F, fibres, floor).values)[0]
 
     def isochoric_stress(self, F: np.ndarray, floor: float = 0.0, fibres: np.ndarray | None = None) -> np.ndarray:
-        """First Piola-Kirchhoff stress of psi alone [MPa], (..., 3, 3); J below `floor` is read as this."""
+        """First Piola-Kirchhoff stress of psi alone [MPa], (..., 3, 3); a point with J below `floor` is crushed."""
         found = self._invariants(F, fibres, floor)
         _, d, _ = self.isochoric(found.values)
         return np.einsum("m...,m...iJ->...iJ", d, found.first)
 
     def isochoric_modulus(self, F: np.ndarray, floor: float = 0.0, fibres: np.ndarray | None = None) -> np.ndarray:
-        """Tangent modulus of psi alone [MPa], indices iJkL; J below `floor` is read as this."""
+        """Tangent modulus of psi alone [MPa], indices iJkL; a point with J below `floor` is crushed."""
         found = self._invariants(F, fibres, floor)
         _, d, dd = self.isochoric(found.values)
         return (np.einsum("mn...,m...iJ,n...kL->...iJkL", dd, found.first, found.first)
@@ -128,9 +129,8 @@ class _Invariants:
     def __init__(self, F: np.ndarray, fibres: np.ndarray, floor: float) -> None:
         self._F, self._fibres = F, fibres
         J, cof = np.linalg.det(F), cofactor(F)
-        if floor > 0.0:
-            J = np.maximum(J, floor)
-        self._G = cof / J[..., None, None]
+        J, s, J_e = crushed(J, floor)
+        self._G = cof / J_e[..., None, None]
         self._C = np.einsum("...iJ,...iL->...JL", F, F)
         tr = np.einsum("...JJ", self._C)[..., None, None]
         plain = [tr[..., 0, 0], np.einsum("...iJ,...iJ", cof, cof)]
@@ -142,7 +142,7 @@ class _Invariants:
             slopes.append(2 * np.einsum("...i,...J->...iJ", n, np.broadcast_to(A, n.shape)))
         self._plain, self._slopes = plain, slopes
         self._p = [4 / 3 if m == 1 else 2 / 3 for m in range(len(plain))]
-        self._scale = [J ** -p for p in self._p]
+        self._scale = [J ** -p * s ** (1.5 * p) for p in self._p]
         self.values = np.stack([s * X for s, X in zip(self._scale, plain)])
         grow = (..., None, None)
         self.first = np.stack([s[grow] * (slope - p * X[grow] * self._G) for s, slope, p, X in

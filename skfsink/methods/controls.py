@@ -7,10 +7,12 @@ from typing import Protocol
 
 from ..errors import ParameterError, require
 
-__all__ = ["COUPLINGS", "MASSES", "EventControls", "ExplicitControls", "HHTControls", "StaticsControls"]
+__all__ = ["COUPLINGS", "ENERGY_TOLERANCE", "MASSES", "EventControls", "ExplicitControls", "HHTControls",
+           "StaticsControls"]
 
 COUPLINGS = ("iterated", "single")
 MASSES = ("lumped", "consistent")
+ENERGY_TOLERANCE = 2e-5  #: of an explicit step, that serves for all laws at their own strength
 
 
 @dataclass(frozen=True)
@@ -24,6 +26,8 @@ class ExplicitControls:
     mass_floor: least lumped mass, as a fraction of the intact one, in [0, 1).
     estimate_every: steps after which omega_max is estimated again at the latest, >= 1.
     estimate_change: relative change of the cheap indicator that calls for a new estimate, in (0, 1).
+    energy_tolerance: energy that a step may feed in or take out, of that of the body, in [0, 1]; else it is made again
+        half as long. 0: no step is rejected, and one that feeds in energy calls for a new estimate of the limit.
     """
 
     courant: float = 0.8
@@ -31,6 +35,7 @@ class ExplicitControls:
     mass_floor: float = 1e-3
     estimate_every: int = 400
     estimate_change: float = 0.05
+    energy_tolerance: float = 0.0
 
     def __post_init__(self) -> None:
         require("courant", self.courant, low=0, high=1, low_open=True)
@@ -38,6 +43,7 @@ class ExplicitControls:
         require("mass_floor", self.mass_floor, low=0, high=1, high_open=True)
         require("estimate_every", self.estimate_every, "steps", low=1, whole=True)
         require("estimate_change", self.estimate_change, low=0, high=1, low_open=True, high_open=True)
+        require("energy_tolerance", self.energy_tolerance, low=0, high=1)
 
 
 @dataclass(frozen=True)
@@ -56,6 +62,7 @@ class HHTControls:
     mass_floor: least lumped mass, as a fraction of the intact one, in [0, 1).
     force_tolerance, correction_tolerance: ABAQUS-like tests, in (0, 0.1].
     gamma_tolerance: change of gamma in the last iteration of a step, in (0, 0.1].
+    gain_tolerance: energy that a step may feed in, of that of the body, in (0, 1]; else it is halved.
     max_iterations: iterations after which a step is rejected, >= 3.
     """
 
@@ -69,6 +76,7 @@ class HHTControls:
     force_tolerance: float = 1e-3
     correction_tolerance: float = 2e-3
     gamma_tolerance: float = 1e-2
+    gain_tolerance: float = 1e-3
     max_iterations: int = 16
 
     def __post_init__(self) -> None:
@@ -79,6 +87,7 @@ class HHTControls:
         require("force_tolerance", self.force_tolerance, low=0, high=0.1, low_open=True)
         require("correction_tolerance", self.correction_tolerance, low=0, high=0.1, low_open=True)
         require("gamma_tolerance", self.gamma_tolerance, low=0, high=0.1, low_open=True)
+        require("gain_tolerance", self.gain_tolerance, low=0, high=1, low_open=True)
         require("max_iterations", self.max_iterations, low=3, whole=True)
         require("mass_floor", self.mass_floor, low=0, high=1, high_open=True)
         if self.coupling not in COUPLINGS:

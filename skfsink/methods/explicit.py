@@ -23,16 +23,15 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..errors import InstabilityError
-from ..fem.pattern import Pattern
+from ..errors import InstabilityError, place_text
 from ..fields.active_zone import Zone
 from ..fields.body import Body
 from ..fields.deletion import delete_failed, left_in
 from ..fields.density import Density
 from ..fields.state import State
 from ..system.jit import njit
-from .controls import EventControls, ExplicitControls
-from .frequency import highest_frequency
+from .controls import ENERGY_TOLERANCE, EventControls, ExplicitControls
+from .step_length import StepLength
 
 __all__ = ["Explicit"]
 
@@ -58,11 +57,7 @@ class Explicit:
     GAMMA_INTERVAL = 0.03  # l/c_s between solves for gamma; the crack then runs less than 3 % of l
     GAMMA_MOST = 20  # steps between them at the most, lest a failing element that shortens the step keeps failing
     GAMMA_TOLERANCE = 1e-6  # relative residual of a solve for gamma
-    CHECK = 5        # steps between looks at the cheap indicator
-    RISEN = 25       # steps after which a risen indicator calls for an estimate; until then the step follows it
-    FALLEN = 100     # steps after which a fallen one does; until then the step is shorter than it need be
-    _REMEMBERED = ("dt", "estimates", "_omega", "_indicator0", "_last_estimate", "_elastic", "_urgent", "_since_gamma")
-    FED_IN = 1e-6    # energy a step may feed in before omega_max is estimated at once, of the initial energy
+    _REMEMBERED = ("_elastic", "_since_gamma")
 
     factorisations = 0
 
@@ -72,15 +67,8 @@ class Explicit:
         self.space, self.free = body.space, body.free
         self._free = np.ascontiguousarray(self.free.reshape(-1, self.space.dim))
         self._grip_velocity, self._knot = self.loading.velocity(0.0), np.inf
-        self._pattern = Pattern(self.space, self.space.dim, self.free, upper=True)
         self._mass_floor = max(self.controls.mass_floor, 1e-12)  # a node without mass or force stays where it is
-        self.dt = 0.0
-        self.estimates = 0
-        self._omega = 0.0
-        self._mode: np.ndarray | None = None
-        self._indicator0 = 0.0
-        self._last_estimate = 0
-        self._urgent = False
+        self.length = StepLength(self.momentum, self.free, self.controls, self._interval)
         self._since_gamma = 0
         self._zones: tuple[Zone, ...] = ()
 
@@ -100,6 +88,7 @@ class Explicit:
         self._W_max = self.momentum.backend.tile(state.W_max)
         self._elastic = self.momentum.energy
         self._spare, self._du = np.empty_like(self.reaction), np.empty_like(self.reaction)
+        self._next = np.empty_like(state.u), np.empty_like(state.u), np.empty_like(state.u)
 
     def _set_mass(self) -> None:
         self.mass = self.momentum.lumped_mass(self._mass_floor)
@@ -125,48 +114,74 @@ class Explicit:
             yield state
 
     def step(self, state: State) -> None:
-        """One time step, with the solve for gamma when it is due."""
-        if self._mode is None or self._urgent or state.step % self.CHECK == 0:
-            self._set_step(state)
-        dt, grip, dead = self.dt, state.grip + self.dt, self.momentum.dead
+        """One time step, with the solve for gamma when it is due.
+
+        Raises
+        ------
+        InstabilityError
+            No step, however short, keeps the energy.
+        """
+        self.length.look(state.step, state.u, self.mass, self._inverse)
+        while not self._try(state):
+            if self.length.is_given_up:
+                self._give_up(state)
+        if state.grip == self._knot:
+            self._turn(state)
+        self._since_gamma += 1
+        if self._since_gamma >= self._gamma_every:
+            self._since_gamma = 0
+            self.update_density(state)
+
+    def _try(self, state: State) -> bool:
+        """Take a step, if it keeps the energy; else the state stays as it was, and the next step is shorter."""
+        dt, grip, dead = self.length.dt, state.grip + self.length.dt, self.momentum.dead
         if grip >= self._knot:
             dt, grip = self._knot - state.grip, self._knot
         old, before = self.reaction, None if dead is None else dead.values
         self.momentum.set_time(grip)
-        du = self._du
-        _move(state.u, state.v, state.a, self._free, self._grip_velocity, dt, du)
-        force = self.momentum.force(state.u, self._spare)
-        np.maximum(self._W_max, self._W, out=self._W_max)
-        trapezoid, held, kinetic, swing = _kick(state.v, state.a, self._inverse, self.mass, old, force, du, dt)
-        self.reaction, self._spare = force, old
+        (u, v, a), du = self._next, self._du
+        _move((state.u, state.v, state.a), self._free, self._grip_velocity, dt, (u, v, du))
+        force = self.momentum.force(u, self._spare)
+        trapezoid, held, kinetic, swing = _kick((v, state.a, a), self._inverse, self.mass, (old, force), du, dt)
         ledger = state.ledger
         elastic = self.momentum.energy
-        energy_fed_in, scale = dt * dt / 8 * swing + (elastic - self._elastic) - trapezoid, ledger.initial
+        energy_fed_in = dt * dt / 8 * swing + (elastic - self._elastic) - trapezoid
         if dead is not None and before is not None:
             energy_fed_in -= dead.effort(before, du)
+        energy, initial = max(abs(ledger.initial), elastic + kinetic, self.body.least_energy), ledger.initial
+        if dead is not None:
+            initial = max(abs(initial), elastic + kinetic)
+        if not self.length.accepts(energy_fed_in, energy, initial):
+            self.momentum.set_time(state.grip)
+            return False
+        self._next = state.u, state.v, state.a
+        state.u, state.v, state.a = u, v, a
+        self.reaction, self._spare = force, old
+        np.maximum(self._W_max, self._W, out=self._W_max)
+        if dead is not None and before is not None:
             ledger.work += dead.changed(before, state.u - 0.5 * du)
-            ledger.loads, scale = self.momentum.loads, max(abs(scale), elastic + kinetic)
+            ledger.loads = self.momentum.loads
         ledger.numerical -= energy_fed_in
-        if energy_fed_in > self.FED_IN * scale:  # first sign of a step that has become too long
-            self._urgent = True
         ledger.work += held
         ledger.elastic = self._elastic = elastic
         ledger.kinetic = kinetic
         state.time += dt
         state.grip = grip
         state.step += 1
-        if grip == self._knot:
-            self._turn(state)
-        self._since_gamma += 1
-        if self._since_gamma >= self._gamma_every:
-            self._since_gamma = 0
-            self.update_density(state)
-        if state.step % 100 == 0 and not np.isfinite(kinetic + elastic):
-            self._blow_up(state)
+        return True
 
-    def _blow_up(self, state: State) -> None:
-        raise InstabilityError(f"the explicit integration blew up at t = {state.time:.4g} s (step {state.step}): "
-                               f"lower courant, now {self.controls.courant:g}")
+    def _give_up(self, state: State) -> None:
+        """The step that was tried last left its velocities in `_next`."""
+        if self.controls.energy_tolerance == 0.0:
+            raise InstabilityError(
+                f"the explicit integration blew up at t = {state.time:.4g} s (step {state.step}): lower courant, now "
+                f"{self.controls.courant:g}, or reject such steps by an energy_tolerance of {ENERGY_TOLERANCE:g}")
+        speed = np.abs(np.nan_to_num(self._next[1], nan=np.inf)).max(axis=1)
+        raise InstabilityError(
+            f"no explicit step down to {self.length.dt:.2g} s keeps the energy of the body to "
+            f"{self.controls.energy_tolerance:g} of it, at t = {state.time:.4g} s (step {state.step}), near "
+            f"{place_text(self.space.X[int(np.argmax(speed))])} mm of the undeformed body: refine the mesh there, "
+            f"raise energy_tolerance, or take --integrator hht")
 
     def _turn(self, state: State) -> None:
         """At a knot: grips take their new velocities at once; what that needs is their work."""
@@ -180,8 +195,6 @@ class Explicit:
         """Solve for gamma from the history, book what the sink takes, delete failed elements."""
         momentum, ledger = self.momentum, state.ledger
         self.sync(state)
-        if not np.isfinite(state.W_max.max()):
-            self._blow_up(state)
         before = Density(state.gamma, state.sink, self._zones)
         now = self.density.update(state.W_max, before, self.GAMMA_TOLERANCE)
         if now is before:
@@ -221,47 +234,38 @@ class Explicit:
         return self.GAMMA_INTERVAL * self.density.law.length_scale / (self.momentum.shear_wave_speeds[1] * 1e3)
 
     # --- the step size ---
-    def _set_step(self, state: State) -> None:
-        c = self.controls
-        indicator = self._indicator(state.u)
-        ratio = indicator / self._indicator0 if self._indicator0 > 0 else np.inf
-        since = state.step - self._last_estimate
-        moved = abs(ratio - 1) > 2 * c.estimate_change and since >= (self.RISEN if ratio > 1 else self.FALLEN)
-        if self._mode is None or self._urgent or moved or since >= c.estimate_every:
-            self._omega, self._mode = highest_frequency(self.momentum, self._pattern, self.free, state.u, self.mass,
-                                                        self._mode)
-            self._omega = max(self._omega, indicator**0.5)  # a Rayleigh quotient, in case Lanczos missed that element
-            self._indicator0, self._last_estimate, ratio = indicator, state.step, 1.0
-            self.estimates += 1
-            self._urgent = False
-        swings = self._omega > 0.0  # else every node is held
-        self.dt = float(c.courant * 2.0 / (self._omega * np.sqrt(max(1.0, ratio)))) if swings else self._interval
-        if not c.gamma_every:
-            self.dt = min(self.dt, self._interval)  # in plane stress the stable step may be longer
+    @property
+    def dt(self) -> float:
+        """The current step [s]."""
+        return self.length.dt
+
+    @property
+    def estimates(self) -> int:
+        """Frequency estimates made."""
+        return self.length.estimates
+
+    @property
+    def rejected(self) -> int:
+        """Steps that were made again at half length."""
+        return self.length.rejected
 
     def step_share(self, state: State) -> float:
         """The step over the stability limit of `state` as it is now; nothing is changed."""
-        omega, _ = highest_frequency(self.momentum, self._pattern, self.free, state.u, self.mass, self._mode)
-        return 0.5 * self.dt * max(omega, self._indicator(state.u) ** 0.5)
-
-    def _indicator(self, u: np.ndarray) -> float:
-        """A lower bound of omega_max^2 that follows it closely; see :meth:`.Momentum.stiffest`."""
-        return self.momentum.stiffest(u, self._inverse)
+        return self.length.share(state.u, self.mass, self._inverse)
 
     # --- checkpoints ---
     def memory(self) -> dict[str, np.ndarray]:
         """What the integrator remembers beyond the state, for a checkpoint."""
-        assert self._mode is not None
-        return {"mode": self._mode, "reaction": self.reaction,
-                "zone_depths": np.array([zone.depth for zone in self._zones], int),
-                **{name: np.array(getattr(self, name)) for name in self._REMEMBERED}}
+        return {"reaction": self.reaction, "zone_depths": np.array([zone.depth for zone in self._zones], int),
+                **{name: np.array(getattr(self, name)) for name in self._REMEMBERED}, **self.length.memory()}
 
     def restore(self, state: State, memory: dict[str, np.ndarray]) -> None:
         """Go on exactly where :meth:`memory` was taken."""
         self.start(state)
-        self._mode, self.reaction = memory["mode"], memory["reaction"]
+        self.reaction = memory["reaction"]
         for name in self._REMEMBERED:
             setattr(self, name, memory[name].item())
+        self.length.restore(memory)
         if self.density.zone is not None:
             self._zones = tuple(self.density.zone.of_depth(depth) for depth in memory["zone_depths"])
 
@@ -273,21 +277,29 @@ def _half_square(v: np.ndarray) -> np.ndarray:
 
 
 @njit(cache=True)
-def _move(u, v, a, free, grip_velocity, dt, du):  # type: ignore[no-untyped-def]
-    """Advance v by half a step and u by a step, of which `du` takes the increment."""
+def _move(now, free, grip_velocity, dt, new):  # type: ignore[no-untyped-def]
+    """From u, v, a: u after a step, v after half of it, and the increment of u."""
+    u, v, a = now
+    u_new, v_new, du = new
     for n in range(u.shape[0]):
         for i in range(u.shape[1]):
             if free[n, i]:
-                v[n, i] += 0.5 * dt * a[n, i]
-                du[n, i] = dt * v[n, i]
+                v_new[n, i] = v[n, i] + 0.5 * dt * a[n, i]
+                du[n, i] = dt * v_new[n, i]
             else:
+                v_new[n, i] = v[n, i]
                 du[n, i] = dt * grip_velocity[n, i]
-            u[n, i] += du[n, i]
+            u_new[n, i] = u[n, i] + du[n, i]
 
 
 @njit(cache=True)
-def _kick(v, a, inverse, mass, old, force, du, dt):  # type: ignore[no-untyped-def]
-    """Second half of the step; returns trapezoidal work (all, held), kinetic energy, change of f.m^-1 f (free)."""
+def _kick(motion, inverse, mass, forces, du, dt):  # type: ignore[no-untyped-def]
+    """Second half of the step: v at half of it goes to its end, and a is found there, from the forces before and after.
+
+    Returns trapezoidal work (all, held), kinetic energy, and the change of f.m^-1 f (free).
+    """
+    v, a, a_new = motion
+    old, force = forces
     work, held, kinetic, swing = 0.0, 0.0, 0.0, 0.0
     for n in range(v.shape[0]):
         square = 0.0
@@ -295,11 +307,12 @@ def _kick(v, a, inverse, mass, old, force, du, dt):  # type: ignore[no-untyped-d
             f, one_by_m = force[n, i], inverse[n, i]
             if one_by_m > 0.0:
                 f0 = -mass[n] * a[n, i]
-                a[n, i] = -f * one_by_m
-                v[n, i] += 0.5 * dt * a[n, i]
+                a_new[n, i] = -f * one_by_m
+                v[n, i] += 0.5 * dt * a_new[n, i]
                 swing += (f * f - f0 * f0) * one_by_m
                 work += 0.5 * (f0 + f) * du[n, i]
             else:
+                a_new[n, i] = a[n, i]
                 held += 0.5 * (old[n, i] + f) * du[n, i]
             square += v[n, i] * v[n, i]
         kinetic += 0.5 * mass[n] * square

@@ -10,7 +10,8 @@ pass: gamma from the last accepted state, then Newton's method at that gamma. Th
 
 A step is accepted when, over the nodes that still have mass, the largest residual is below `force_tolerance` times
 the mean force of the elements on their nodes plus the mean inertia, the last correction below `correction_tolerance`
-times the increment, and gamma has settled. Where elements fail a step is at most 0.1 l/c_s. History and deletions are
+times the increment, gamma has settled, no live point is inside out, and the scheme has not fed in more energy than
+`gain_tolerance` allows. Where elements fail a step is at most 0.1 l/c_s. History and deletions are
 committed on accepted steps only.
 """
 
@@ -18,6 +19,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -25,6 +27,7 @@ from ..errors import ConvergenceError, ParameterError
 from ..fields.body import Body
 from ..fields.deletion import delete_failed
 from ..fields.density import Density
+from ..fields.energy import Ledger
 from ..fields.state import State
 from .controls import EventControls, HHTControls
 from .hht_ledger import Balance, book_motion, book_sink
@@ -129,7 +132,7 @@ class HHT:
             trial.predict(self._grip_velocity, self._rate)
             accepted = trial.iterate()
             self.iterations += trial.corrections
-            if accepted:
+            if accepted and self._accept(state, trial):
                 break
             if trial.cracked and not (self.to_onset or self._cut):
                 self._cut = True
@@ -142,7 +145,6 @@ class HHT:
                 raise ConvergenceError(f"the implicit integration stalled at t = {state.time:.4g} s: no step down to "
                                        f"{self.controls.dt_least:.1g} s converges; lower --hht-dt (now "
                                        f"{self.controls.dt:g} s), or take --integrator explicit")
-        self._accept(state, trial)
         if trial.corrections <= self.controls.max_iterations // 2:
             self.dt = min(self.dt * self.GROW, self.controls.dt)
 
@@ -171,14 +173,21 @@ class HHT:
             self._loads = self.momentum.dead.values
 
     # --- a step that is taken ---
-    def _accept(self, state: State, trial: Trial) -> None:
+    def _accept(self, state: State, trial: Trial) -> bool:
+        """Take a step; False, and nothing has changed, if the scheme feeds in too much energy in it."""
         momentum, free, dt = self.momentum, self.free, trial.dt
         new = Balance(trial.force, -trial.weighted, momentum.gamma, momentum.W, trial.mass, self.inertia.places())
         g = self.controls.newmark_gamma
         a0, a1 = state.a.ravel()[free], trial.a.ravel()[free]
         v = state.v.copy()
         v.reshape(-1)[free] = state.v.ravel()[free] + dt * ((1 - g) * a0 + g * a1)
-        self._book(state, trial, new, v)
+        ledger = replace(state.ledger)
+        loads = self._book(ledger, state, trial, new, v)
+        energy = max(abs(ledger.initial), ledger.elastic + ledger.kinetic, self.momentum.energy,
+                     self.body.least_energy)
+        if not state.ledger.numerical - ledger.numerical <= self.controls.gain_tolerance * energy:
+            return False
+        state.ledger, self._loads = ledger, loads
         self._rate = (trial.u - state.u) / dt
         state.u, state.gamma, state.sink = trial.u, trial.density.gamma, trial.density.sink
         state.a, state.v = trial.a.copy(), v
@@ -190,10 +199,11 @@ class HHT:
         if trial.end == self._knot:
             self._grip_velocity, self._knot = self.loading.velocity(trial.end), self.loading.knot(trial.end)
             state.v[self._held] = self._grip_velocity[self._held]
+        return True
 
-    def _book(self, state: State, trial: Trial, new: Balance, v: np.ndarray) -> None:
-        """Book a step, with the velocity `v` (n, dim) after it, in the ledger of the state before it."""
-        ledger, old, dead, du = state.ledger, self._now, self.momentum.dead, trial.u - state.u
+    def _book(self, ledger: Ledger, state: State, trial: Trial, new: Balance, v: np.ndarray) -> np.ndarray | None:
+        """Book a step, with the velocity `v` (n, dim) after it, in a ledger of the state before; returns dead loads."""
+        old, dead, du = self._now, self.momentum.dead, trial.u - state.u
         half_v2 = self.inertia.half_v2(state.v), self.inertia.half_v2(v)
         stored, rest = book_sink(ledger, self.space.w, old, new, half_v2)
         accelerations = state.a.ravel()[self.free], trial.a.ravel()[self.free]
@@ -205,7 +215,8 @@ class HHT:
         if dead is not None and self._loads is not None:
             ledger.numerical += dead.effort(self._loads, du)
             ledger.work += dead.changed(self._loads, state.u + 0.5 * du)
-            self._loads = dead.values
+            return dead.values
+        return self._loads
 
     def _bury(self, state: State, new: Balance) -> None:
         """Delete what has failed in a step; nodes without mass stand still."""

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..errors import ConvergenceError
 from ..fem.direct import Factorization
+from ..fem.indicators import inverted
 from ..fem.pattern import Pattern
 from ..fields.body import Body
 from ..fields.density import Density
@@ -66,7 +67,7 @@ class Trial:
     """
 
     FRESH, KEPT = 3, 25  # iterations of a step to the onset with factors of their own; then these serve so many
-    LEAST_J = 0.02       # of a Gauss point, below which a trial is given up
+    LIVE = 0.5           # gamma of a point that must not be inside out
     RUNS_AWAY = 3        # iterations in a row in which the change of gamma grows, at which a step to the onset is cut
 
     def __init__(self, scheme: Scheme, state: State, old: Balance, dt: float, end: float) -> None:
@@ -101,7 +102,7 @@ class Trial:
                 residual, inertia, live = self._residual()
                 if self._balanced(residual, inertia, live):
                     self.cracked = self._runs_through()
-                    return not self.cracked
+                    return not (self.cracked or self._is_inside_out())
                 if self.corrections == c.max_iterations:
                     return False
                 self._correct(residual, live)
@@ -111,9 +112,9 @@ class Trial:
             return False
 
     def _evaluate(self) -> None:
-        """Force at the displacement; a trial in which a point is crushed, or no number, is given up."""
+        """Force at the displacement; a trial without a finite energy is given up."""
         self.force = self.momentum.force(self.u)
-        if not (self.momentum.least_J > self.LEAST_J and np.isfinite(self.momentum.energy)):
+        if not np.isfinite(self.momentum.energy):
             raise _Rejected
 
     def _residual(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -139,6 +140,12 @@ class Trial:
         """Whether the step has converged, but to a crack that has run through it."""
         fall = float((self.state.gamma - self.density.gamma).max())
         return self.dt > self.scheme.failing_step and fall > 0.5
+
+    def _is_inside_out(self) -> bool:
+        """Whether a live point is."""
+        if self.momentum.least_J > 0.0:
+            return False
+        return inverted(self.scheme.body.space, self.u, self.momentum.gamma)[1] > self.LIVE
 
     def _correct(self, residual: np.ndarray, live: np.ndarray) -> None:
         """A Newton step of displacement and acceleration at fixed gamma."""

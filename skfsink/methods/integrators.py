@@ -33,6 +33,10 @@ class Integrator(Protocol):
         """Internal force less the dead loads (n, dim) at the current displacement."""
 
     @property
+    def rejected(self) -> int:
+        """Steps that were tried and made again, shorter."""
+
+    @property
     def factorisations(self) -> int:
         """Numerical factorisations made so far."""
 

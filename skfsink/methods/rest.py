@@ -51,7 +51,8 @@ class LoadingFromRest:
         self._last = controls.dt
         self.integrator = HHT(body, replace(
             controls, coupling="iterated", dt=longest, dt_first=0.0, force_tolerance=self.TOLERANCE,
-            correction_tolerance=2 * self.TOLERANCE, gamma_tolerance=self.TOLERANCE, max_iterations=self.ITERATIONS),
+            correction_tolerance=2 * self.TOLERANCE, gamma_tolerance=self.TOLERANCE, gain_tolerance=1.0,
+            max_iterations=self.ITERATIONS),
             to_onset=True)
 
     @property

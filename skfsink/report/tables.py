@@ -162,7 +162,8 @@ def cost_table(runs: Sequence[Run], labels: Sequence[str]) -> Table:
     phases = list(dict.fromkeys(phase for wall in walls for phase in wall))
     rows = [_row(f"wall time, {phase}", "s", [wall.get(phase) for wall in walls]) for phase in phases]
     rows.append(_row("wall time, in all", "s", [sum(wall.values()) if wall else None for wall in walls]))
-    rows += [row("steps or passes", "", "cost", "steps"), row("solves for γ", "", "cost", "gamma_solves"),
+    rows += [row("steps or passes", "", "cost", "steps"),
+             row("steps rejected", "", "cost", "rejected_steps"), row("solves for γ", "", "cost", "gamma_solves"),
              row("factorisations", "", "cost", "factorisations"), row("peak memory", "MB", "cost", "peak_rss_mb"),
              row("elements", "", "elements"), row("unknowns, displacement", "", "unknowns", "displacement"),
              row("unknowns, density", "", "unknowns", "density"),

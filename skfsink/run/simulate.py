@@ -226,10 +226,13 @@ class Simulation:
     # --- costs and checkpoints ---
     def cost(self) -> dict[str, Any]:
         """Wall times and counts since the run began, over all its sessions."""
-        stepping = 0 if self.integrator is None else self.integrator.factorisations
+        stepping, rejected = 0, 0
+        if self.integrator is not None:
+            stepping = self.integrator.factorisations
+            rejected = self.integrator.rejected if self.state.phase != "loading" else 0
         factorisations = (self.costs.factorisations + self.statics.factorisations + self.density.factorisations
                           + stepping)
-        return {"wall": dict(self.costs.wall), "steps": self.costs.steps,
+        return {"wall": dict(self.costs.wall), "steps": self.costs.steps, "rejected_steps": rejected,
                 "gamma_solves": self.costs.gamma_solves + self.density.solves, "factorisations": factorisations}
 
     def _save(self) -> None:

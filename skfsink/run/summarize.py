@@ -62,7 +62,8 @@ def summarize(scene: Scene, simulation: Simulation) -> dict[str, Any]:
         "deleted_elements": int(state.deleted.sum()), "warnings": simulation.notes.texts,
         "notes": list(scene.sample.notes),
         "cost": {"wall_s": {k: round(v, 3) for k, v in cost["wall"].items()}, "steps": cost["steps"],
-                 "gamma_solves": cost["gamma_solves"], "factorisations": cost["factorisations"],
+                 "rejected_steps": cost["rejected_steps"], "gamma_solves": cost["gamma_solves"],
+                 "factorisations": cost["factorisations"],
                  "peak_rss_mb": round(peak_rss_mb(), 1)},
         "versions": versions(), "assumed": list(scene.assumed), "moments": simulation.frames.moments,
         "series": "loading" if simulation.unfailed else "run"}

@@ -134,6 +134,9 @@ class Options:
         Explicit step over the stability limit estimated for the deformed state, in (0, 1].
     gamma_every
         Explicit steps between solves for γ, >= 0; 0 takes as many as fit in 0.03 l/c_s (0.1 µs), at most 20.
+    energy_tolerance
+        Energy that an explicit step may feed in or take out, of that of the body, in [0, 1]; else it is rejected and
+        halved. 0 rejects none; 2e-5 is for materials that fail at large stretches.
     mass_floor
         Least lumped mass of a node, relative to the intact one, in [0, 1).
     hht_alpha
@@ -204,6 +207,7 @@ class Options:
     aftermath: Annotated[float, ANALYSIS, Unit("s")] = Controls.aftermath
     courant: Annotated[float, EXPLICIT] = ExplicitControls.courant
     gamma_every: Annotated[int, EXPLICIT] = ExplicitControls.gamma_every
+    energy_tolerance: Annotated[float, EXPLICIT] = ExplicitControls.energy_tolerance
     mass_floor: Annotated[float, EXPLICIT] = ExplicitControls.mass_floor
     hht_alpha: Annotated[float, HHT] = HHTControls.alpha
     hht_dt: Annotated[float, HHT, Unit("s")] = HHTControls.dt
@@ -284,7 +288,8 @@ class Options:
         shared = {f.name: getattr(self, f.name) for f in fields(Controls)
                   if f.name not in ("explicit", "hht", "statics")}
         return Controls(
-            **shared, explicit=ExplicitControls(self.courant, self.gamma_every, self.mass_floor),
+            **shared, explicit=ExplicitControls(self.courant, self.gamma_every, self.mass_floor,
+                                                energy_tolerance=self.energy_tolerance),
             hht=HHTControls(self.hht_alpha, self.hht_dt, coupling=self.coupling, mass=self.mass,
                             mass_floor=self.mass_floor),
             statics=StaticsControls(front=self.front))

@@ -25,6 +25,7 @@ from matplotlib.axes import Axes
 from ..run.display import Display
 from . import stability_elements as elements
 from . import stability_onset as onset
+from . import stability_strength as strength
 from . import stability_time as time
 from .chart import page
 from .part import Part, Planned, Points
@@ -45,6 +46,7 @@ class Failure(NamedTuple):
 FAILURES = {
     "explicit": Failure(time.plan_explicit, time.draw_explicit),
     "hht": Failure(time.plan_hht, time.draw_hht),
+    "strength": Failure(strength.plan_strength, strength.draw_strength, 2),
     "alpha": Failure(time.plan_alpha, time.draw_alpha),
     "staggering": Failure(onset.plan_staggering, onset.draw_staggering, 2),
     "sink": Failure(elements.plan_sink, elements.draw_sink, 2),
@@ -59,8 +61,8 @@ FAILURES = {
 FLAG = Parameter(negative="", show_default=False)
 
 
-def stability(*, only: Literal["explicit", "hht", "alpha", "staggering", "sink", "locking", "checkerboard", "flat",
-                               "deletion", "unconverged", "notch", "length"] | None = None,
+def stability(*, only: Literal["explicit", "hht", "strength", "alpha", "staggering", "sink", "locking", "checkerboard",
+                               "flat", "deletion", "unconverged", "notch", "length"] | None = None,
               quick: Annotated[bool, FLAG] = False, fresh: Annotated[bool, FLAG] = False,
               out: Path = Path("results/study/stability"), quiet: Annotated[bool, FLAG] = False) -> None:
     """Find where the methods fail, and draw it.

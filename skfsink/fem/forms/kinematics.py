@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from skfem.helpers import ddot
 
+from ...material.crushed import crushed
 from ...material.general import cofactor
-from ..kernels.lanes import J_FLOOR
 
 __all__ = ["Derivatives", "Kinematics", "element_mean", "kinematics", "once", "volume_derivatives"]
 
@@ -37,10 +37,11 @@ class Kinematics(NamedTuple):
 
     Attributes
     ----------
-    F, F_invT: deformation gradient and F^-T with J not below `J_FLOOR`, (dim, dim, ne, nq).
+    F, F_invT: deformation gradient and F^-T, with J_e of a crushed point, (dim, dim, ne, nq).
     cofactor: J F^-T.
     full: F with F_33 = 1 in a plane, (ne, nq, 3, 3).
-    J, J_safe: det F, and not below `J_FLOOR`.
+    J, J_e, floored: det F; that of a crushed point, see :mod:`.crushed`, and not below its floor.
+    R: J^(-2/3), continued where a point is crushed.
     tr_C: F : F, in three dimensions.
     """
 
@@ -49,7 +50,9 @@ class Kinematics(NamedTuple):
     cofactor: np.ndarray
     full: np.ndarray
     J: np.ndarray
-    J_safe: np.ndarray
+    J_e: np.ndarray
+    floored: np.ndarray
+    R: np.ndarray
     tr_C: np.ndarray
 
 
@@ -60,10 +63,11 @@ def kinematics(w: Any) -> Kinematics:
     F = np.broadcast_to(np.eye(3), (*H.shape[:-2], 3, 3)).copy()
     F[..., :dim, :dim] += H
     J = np.linalg.det(F)
-    J_safe = np.maximum(J, J_FLOOR)
+    floored, s, J_e = crushed(J)
     plain = np.moveaxis(F[..., :dim, :dim], (-2, -1), (0, 1))
     cof = np.moveaxis(cofactor(F)[..., :dim, :dim], (-2, -1), (0, 1))
-    return Kinematics(plain, cof / J_safe, cof, F, J, J_safe, np.einsum("...iJ,...iJ", F, F))
+    return Kinematics(plain, cof / J_e, cof, F, J, J_e, floored, floored ** (-2 / 3) * s,
+                      np.einsum("...iJ,...iJ", F, F))
 
 
 class Derivatives(NamedTuple):

@@ -11,8 +11,8 @@ from skfem import BilinearForm, Functional, LinearForm
 from skfem.helpers import ddot, dot, grad
 
 from ...material import GeneralMaterial, Material
+from ...material.crushed import J_FLOOR
 from ..kernels import ERSATZ_STIFFNESS, SOFT_GAMMA
-from ..kernels.lanes import J_FLOOR
 from .kinematics import element_mean, kinematics, once, volume_derivatives
 
 __all__ = ["MomentumForms", "dilatation", "ersatz", "mass_form", "momentum_forms", "tangents"]
@@ -50,7 +50,7 @@ def momentum_forms(material: Material, j_bar: bool = True) -> MomentumForms:
     def isochoric(w: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """psi and its two derivatives at I1'."""
         at = kinematics(w)
-        return material.isochoric(at.J_safe ** (-2 / 3) * at.tr_C)
+        return material.isochoric(at.R * at.tr_C)
 
     volumetric = _volumetric(k, j_bar)
 
@@ -61,12 +61,12 @@ def momentum_forms(material: Material, j_bar: bool = True) -> MomentumForms:
     @LinearForm
     def residual(v: Any, w: Any) -> np.ndarray:
         at, (_, dpsi, _) = kinematics(w), isochoric(w)
-        dI1 = at.J_safe ** (-2 / 3) * (2 * at.F - 2 / 3 * at.tr_C * at.F_invT)
+        dI1 = at.R * (2 * at.F - 2 / 3 * at.tr_C * at.F_invT)
         return ddot(w["gamma"] * dpsi * dI1 + volumetric(w).pressure * at.cofactor, grad(v))
 
     def second(du: Any, v: Any, w: Any, convex: bool) -> np.ndarray:
         at, (_, dpsi, ddpsi), gamma = kinematics(w), isochoric(w), np.asarray(w["gamma"])
-        scale = at.J_safe ** (-2 / 3)
+        scale = at.R
         a, b = grad(du), grad(v)
         dI1 = scale * (2 * at.F - 2 / 3 * at.tr_C * at.F_invT)
         volume = volume_derivatives(a, b, w)
@@ -83,11 +83,11 @@ def momentum_forms(material: Material, j_bar: bool = True) -> MomentumForms:
     def bounds(w: Any) -> tuple[np.ndarray, np.ndarray]:
         """Least and greatest p J for which a Gauss point is stable."""
         at, (_, dpsi, _) = kinematics(w), isochoric(w)
-        c = np.asarray(w["gamma"]) * dpsi * at.J_safe ** (-2 / 3)
-        least = at.J_safe  # product of two stretches that the deformation can turn
+        c = np.asarray(w["gamma"]) * dpsi * at.R
+        least = at.J_e  # product of two stretches that the deformation can turn
         if len(at.F) == 3:
             C = np.einsum("...iJ,...iL->...JL", at.full, at.full)
-            least = at.J_safe / np.sqrt(np.linalg.eigvalsh(C)[..., -1])
+            least = at.J_e / np.sqrt(np.linalg.eigvalsh(C)[..., -1])
         return 2 / 3 * at.tr_C * c - 2 * c * least, 2 / 3 * at.tr_C * c + 2 * c * least
 
     return MomentumForms(energy, residual, *tangents(second), mass_form(material), dilatation)

@@ -61,7 +61,7 @@ def plane_stress_forms(material: Material) -> MomentumForms:
     @once
     def sheet(w: Any) -> _Sheet:
         at = kinematics(w)
-        return _thin(material, at.tr_C - 1.0, at.J_safe)
+        return _thin(material, at.tr_C - 1.0, at.floored)
 
     @Functional
     def energy(w: Any) -> np.ndarray:

@@ -19,7 +19,16 @@ import numpy as np
 
 from ...material.compiled import isochoric_law
 from ...system.jit import njit
-from .lanes import FAST, GAUSS_HIGH, GAUSS_LOW, J_FLOOR, LANES, guess_inverse_cbrt, refine_inverse_cbrt
+from .lanes import (
+    FAST,
+    GAUSS_HIGH,
+    GAUSS_LOW,
+    J_FLOOR,
+    LANES,
+    continue_below_floor,
+    guess_inverse_cbrt,
+    refine_inverse_cbrt,
+)
 
 # Rows of the workspace and of the geometry, four Gauss points each: a quantity at Gauss point q of lane i is at
 # (row + q) * LANES + i, so that what is done point by point is one loop over 4 * LANES numbers.
@@ -199,6 +208,7 @@ def force_2d(address, constants, volumetric_part, x, elements):  # type: ignore[
         least_live(J, g, least)
         guess_inverse_cbrt(floored.view(np.int64), R.view(np.int64))
         refine_inverse_cbrt(floored, R)
+        continue_below_floor(J, floored, R)
         _invariant(ws)
         law(I1, constants, psi_q, dpsi, ddpsi)
         if j_bar:

@@ -13,7 +13,7 @@ import numpy as np
 from ...material.compiled import isochoric_law
 from ...system.jit import njit
 from .force2d import _add, _dilatation_plain, least_live
-from .lanes import FAST, GAUSS_HIGH, GAUSS_LOW, J_FLOOR, guess_inverse_cbrt, refine_inverse_cbrt
+from .lanes import FAST, GAUSS_HIGH, GAUSS_LOW, J_FLOOR, continue_below_floor, guess_inverse_cbrt, refine_inverse_cbrt
 from .lanes import LANES_3D as LANES
 
 WEIGHT = 9  #: geometry: nine components of d xi/d X at the eight Gauss points, then the weights
@@ -213,6 +213,7 @@ def force_3d(address, constants, volumetric_part, x, elements):  # type: ignore[
         least_live(J, gam, least)
         guess_inverse_cbrt(floored.view(np.int64), R.view(np.int64))
         refine_inverse_cbrt(floored, R)
+        continue_below_floor(J, floored, R)
         _product(R, tr, I1)
         law(I1, constants, psi_q, dpsi, ddpsi)
         if j_bar:

@@ -19,7 +19,7 @@ import numpy as np
 from ...material.compiled import general_law
 from ...system.jit import njit
 from . import force2d, force3d
-from .lanes import FAST, LANES, LANES_3D, guess_inverse_cbrt, refine_inverse_cbrt
+from .lanes import FAST, LANES, LANES_3D, continue_below_floor, guess_inverse_cbrt, refine_inverse_cbrt
 
 __all__ = ["force_general_2d", "force_general_3d"]
 
@@ -115,6 +115,7 @@ def force_general_2d(address, constants, volumetric_part, x, elements):  # type:
         force2d.least_live(J, g, least)
         guess_inverse_cbrt(floored.view(np.int64), R.view(np.int64))
         refine_inverse_cbrt(floored, R)
+        continue_below_floor(J, floored, R)
         _invariants_2d(ws, J, tr, R, fibres[b], I)
         law(I, constants, psi_q, d, dd)
         if j_bar:
@@ -221,6 +222,7 @@ def force_general_3d(address, constants, volumetric_part, x, elements):  # type:
         force2d.least_live(J, gam, least)
         guess_inverse_cbrt(floored.view(np.int64), R.view(np.int64))
         refine_inverse_cbrt(floored, R)
+        continue_below_floor(J, floored, R)
         _invariants_3d(F, tr, R, fibres[tile], I)
         law(I, constants, psi_q, d, dd)
         if j_bar:

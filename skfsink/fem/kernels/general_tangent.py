@@ -17,10 +17,11 @@ import numpy as np
 
 from ...material import GeneralMaterial
 from ...material.compiled import general_law
+from ...material.crushed import J_FLOOR
 from ...system.jit import njit
 from ..pattern import Pattern
 from ..space import Space
-from .lanes import J_FLOOR
+from .lanes import crush_factor
 from .pieces import pieces
 from .records import Solid
 from .tangent import ERSATZ_STIFFNESS, PART, SOFT_GAMMA, parts
@@ -184,6 +185,8 @@ def _make(dim: int) -> Callable[..., Any]:
                 _cofactor(F[q], G[q])
                 J[q] = F[q, 0, 0] * G[q, 0, 0] + F[q, 0, 1] * G[q, 0, 1] + F[q, 0, 2] * G[q, 0, 2]
                 R[q] = max(J[q], J_FLOOR) ** (-2.0 / 3.0)
+                if J[q] < J_FLOOR:
+                    R[q] *= crush_factor(J[q])
                 t, second = 0.0, 0.0
                 for i in range(3):
                     for j in range(3):
@@ -207,6 +210,8 @@ def _make(dim: int) -> Callable[..., Any]:
                             s += G[q, i, j] * dN[e, q, a, j]
                         b[dim * a + i] += w[e, q] * s
                 G[q] /= max(J[q], J_FLOOR)
+                if J[q] < J_FLOOR:
+                    G[q] /= crush_factor(J[q])
                 V += w[e, q]
                 mean += w[e, q] * J[q]
                 gamma_bar += w[e, q] * gamma[e, q]
@@ -221,6 +226,8 @@ def _make(dim: int) -> Callable[..., Any]:
                     pressure, volume = w[e, q] * gamma_bar * k_bulk * (mean - 1.0) * J[q], 0.0
                 else:
                     pressure, volume = wg * k_bulk * (J[q] - 1.0) * J[q], wg * k_bulk * max(J[q], J_FLOOR) ** 2
+                    if J[q] < J_FLOOR:
+                        volume *= crush_factor(J[q]) ** 2
                 _slopes(F[q], G[q], C, B, n[q], tr[q], X)
                 _modulus(dim, F[q], G[q], C, B, n[q], tr[q], R[q], I[:, q], d[:, q], dd[:, :, q], X, wg, pressure,
                          volume, A)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...material.crushed import J_FLOOR
 from ...system.jit import njit
 
 LANES = 32             #: quadrilaterals in a tile
 LANES_3D = 16          #: hexahedra in a tile; their working set is eight times as large
-J_FLOOR = 0.02         #: J below this is read as this; only points without stiffness get there
 FAST = {"contract", "arcp", "nsz", "reassoc"}  #: floating-point freedoms that keep NaN and infinity as they are
 
 GAUSS_LOW = 0.5 - 0.5 / np.sqrt(3.0)
@@ -36,3 +36,22 @@ def refine_inverse_cbrt(J, r):  # type: ignore[no-untyped-def]
         s = s * (1.0 + h * (1 / 3.0 + h * (2 / 9.0 + h * (14 / 81.0))))
         r[i] = s * s
         J[i] = s * s * s
+
+
+@njit
+def crush_factor(J):  # type: ignore[no-untyped-def]
+    """The factor s of a crushed point, see :mod:`.crushed`."""
+    return 1.0 + 2 / 3.0 * (1.0 - J / J_FLOOR)
+
+
+@njit(fastmath=FAST)
+def continue_below_floor(J, inverse, R):  # type: ignore[no-untyped-def]
+    """R = J^(-2/3) and 1/J, found at `J_FLOOR` where J is below it, to what they are there; see :mod:`.crushed`."""
+    least = J[0]
+    for i in range(J.size):
+        least = J[i] if J[i] < least else least
+    if least < J_FLOOR:
+        for i in range(J.size):
+            if J[i] < J_FLOOR:
+                R[i] *= crush_factor(J[i])
+                inverse[i] /= crush_factor(J[i])

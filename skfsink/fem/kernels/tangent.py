@@ -23,10 +23,11 @@ import numpy as np
 
 from ...material import Material
 from ...material.compiled import isochoric_law
+from ...material.crushed import J_FLOOR
 from ...system.jit import njit
 from ..pattern import Pattern
 from ..space import Space
-from .lanes import J_FLOOR
+from .lanes import crush_factor
 from .pieces import pieces
 from .records import Solid
 
@@ -179,6 +180,9 @@ def _make(dim: int) -> Callable[..., Any]:
                 tr[q] = t
                 floored = max(det, J_FLOOR)
                 R[q] = floored ** (-2.0 / 3.0)
+                if det < J_FLOOR:
+                    R[q] *= crush_factor(det)
+                    floored *= crush_factor(det)  # J_e
                 if convex:  # least product of two stretches that the deformation can turn
                     least[q] = floored if dim == 2 else floored / np.sqrt(_greatest(F, t))
                 I1[q] = R[q] * t
@@ -207,6 +211,8 @@ def _make(dim: int) -> Callable[..., Any]:
                     wpJ, wkJJ = w[e, q] * gamma_bar * k_bulk * (mean - 1.0) * J[q], 0.0
                 else:
                     wpJ, wkJJ = wg * k_bulk * (J[q] - 1.0) * J[q], wg * k_bulk * max(J[q], J_FLOOR) ** 2
+                    if J[q] < J_FLOOR:
+                        wkJJ *= crush_factor(J[q]) ** 2
                 if convex:
                     middle, reach = 2.0 / 3.0 * tr[q] * c1, 2.0 * c1 * least[q]
                     wpJ = min(max(wpJ, middle - reach), middle + reach)

@@ -45,10 +45,12 @@ class Progress(Observer):
         done = 0.0 if view.quasistatic else state.time / view.end
         tip = (f"tip {tips.position[0]:.2f}, {tips.position[1]:.2f} mm ×{tips.branches}" if tips.branches
                else "no tip yet")
+        rejected = 0 if view.integrator is None else view.integrator.rejected
+        again = f"  {rejected} steps rejected" if rejected else ""
         clock = f"pass {state.step}" if view.quasistatic else f"{state.time * 1e6:.1f} µs"
         self.display.update(max(done, 0.9 * tips.length / size), (
             f"{clock}  {tip}  load {view.load:.3f} {_unit(view)}  elastic {ledger.elastic:.4f} "
-            f"kinetic {ledger.kinetic:.4f} D {ledger.sink:.4f} U {ledger.paper:.4f}"))
+            f"kinetic {ledger.kinetic:.4f} D {ledger.sink:.4f} U {ledger.paper:.4f}{again}"))
 
 
 def _unit(view: View) -> str:

@@ -1,0 +1,129 @@
+"""Length of the explicit step: a share of the stability limit, cut where the scheme feeds in or takes out energy.
+
+The limit 2/omega_max is estimated now and then, and followed by a cheap indicator between. A step that changes the
+energy by more than a tolerance is rejected, and made again half as long; when steps have been calm for a while, their
+length doubles again.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..fem.pattern import Pattern
+from ..fields.momentum import Momentum
+from .controls import ExplicitControls
+from .frequency import highest_frequency
+
+__all__ = ["StepLength"]
+
+
+class StepLength:
+    """The length of the next step of one integration.
+
+    Memory: estimate of the limit and its mode, indicator, cuts, calm steps: all of the body last looked at.
+
+    Parameters
+    ----------
+    momentum, free: the momentum balance, and the mask of its free unknowns.
+    controls: options.
+    longest: step [s] that is not exceeded.
+
+    Attributes
+    ----------
+    dt: the step [s].   estimates: frequency estimates made.   rejected: steps made again.
+    urgent: whether the limit is estimated before the next step.
+    cut: how often the step is halved at present.   fixed: see :meth:`fix`, 0 if the step follows the limit.
+    """
+
+    CHECK = 5        # steps between looks at the cheap indicator
+    RISEN = 25       # steps after which a risen indicator calls for an estimate; until then the step follows it
+    FALLEN = 100     # steps after which a fallen one does; until then the step is shorter than it need be
+    FED_IN = 1e-6    # energy a step may feed in, of the initial one, before the limit is estimated anew
+    CALM = 20        # steps without a rejection after which the step doubles
+    CUTS = 20        # halvings at which the integration gives up: a millionth of the limit
+
+    kept = ("dt", "estimates", "rejected", "cut", "urgent", "_omega", "_indicator0", "_last_estimate", "_calm")
+
+    def __init__(self, momentum: Momentum, free: np.ndarray, controls: ExplicitControls, longest: float) -> None:
+        self.momentum, self.free, self.controls = momentum, free, controls
+        self._longest = np.inf if controls.gamma_every else longest
+        self._still = longest  # where nothing swings
+        self._pattern = Pattern(momentum.space, momentum.space.dim, free, upper=True)
+        self.dt = 0.0
+        self.estimates = self.rejected = self.cut = self._calm = 0
+        self._omega = self._indicator0 = 0.0
+        self._last_estimate = 0
+        self.fixed, self.urgent = 0.0, False
+        self.mode: np.ndarray | None = None
+
+    def fix(self, dt: float) -> None:
+        """Let every step be `dt` [s] long, whatever the limit is."""
+        self.fixed, self.dt = dt, dt
+
+    def look(self, step: int, u: np.ndarray, mass: np.ndarray, inverse: np.ndarray) -> None:
+        """Set `dt` before step number `step`, from the displacement (n, dim) and masses (n,).
+
+        `inverse` are the inverse masses (n, dim), zero where a degree of freedom is held.
+        """
+        if self.fixed or not (self.mode is None or self.urgent or step % self.CHECK == 0):
+            return
+        c = self.controls
+        indicator = self.momentum.stiffest(u, inverse)
+        ratio = indicator / self._indicator0 if self._indicator0 > 0 else np.inf
+        since = step - self._last_estimate
+        moved = abs(ratio - 1) > 2 * c.estimate_change and since >= (self.RISEN if ratio > 1 else self.FALLEN)
+        if self.mode is None or self.urgent or moved or since >= c.estimate_every:
+            self._omega, self.mode = highest_frequency(self.momentum, self._pattern, self.free, u, mass, self.mode)
+            self._omega = max(self._omega, indicator**0.5)  # a Rayleigh quotient, in case Lanczos missed that element
+            self._indicator0, self._last_estimate, ratio = indicator, step, 1.0
+            self.estimates += 1
+            self.urgent = False
+        swings = self._omega > 0.0  # else every node is held
+        dt = float(c.courant * 2.0 / (self._omega * np.sqrt(max(1.0, ratio)))) if swings else self._still
+        self.dt = min(dt, self._longest) * 0.5**self.cut  # in plane stress the stable step may be longer
+
+    def share(self, u: np.ndarray, mass: np.ndarray, inverse: np.ndarray) -> float:
+        """The step over the stability limit of a body as it is now; nothing is changed."""
+        omega, _ = highest_frequency(self.momentum, self._pattern, self.free, u, mass, self.mode)
+        return 0.5 * self.dt * max(omega, self.momentum.stiffest(u, inverse) ** 0.5)
+
+    def accepts(self, error: float, energy: float, initial: float) -> bool:
+        """Whether a step may be taken that feeds in the `error` of the `energy` of the body; else it is halved.
+
+        `initial` is the energy at the start, in which the error is measured where no step is rejected.
+        """
+        if self.controls.energy_tolerance == 0.0:
+            self.urgent = self.urgent or error > self.FED_IN * initial
+            self.cut = 0 if np.isfinite(error) else self.CUTS + 1
+            return self.cut == 0
+        if not (abs(error) <= self.controls.energy_tolerance * energy and np.isfinite(error)):
+            self.rejected += 1
+            self.cut += 1
+            self._calm = 0
+            self.dt *= 0.5
+            return False
+        self._calm += 1
+        if self.cut and self._calm >= self.CALM:
+            self.cut -= 1
+            self._calm = 0
+            self.dt *= 2.0
+        return True
+
+    @property
+    def is_given_up(self) -> bool:
+        """Whether no step, however short, is taken any more."""
+        return self.cut > self.CUTS
+
+    # --- checkpoints ---
+    def memory(self) -> dict[str, Any]:
+        """What a checkpoint needs."""
+        assert self.mode is not None
+        return {"mode": self.mode, **{name: np.array(getattr(self, name)) for name in self.kept}}
+
+    def restore(self, memory: dict[str, np.ndarray]) -> None:
+        """Go on where :meth:`memory` was taken."""
+        self.mode = memory["mode"]
+        for name in self.kept:
+            setattr(self, name, memory[name].item())

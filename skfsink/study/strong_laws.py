@@ -1,0 +1,166 @@
+"""All laws of the library at their own strength: how dynamic runs of a notched plate keep the energy, and agree.
+
+`python -m skfsink.study.strong_laws` writes `strong_laws.json` and `strong_laws.md`, and goes on where it was stopped.
+The plate is 2 x 2 mm with a notch of 0.5 mm and elements of l/2, on three meshes, loaded to its onset and followed for
+60 us. Each run is compared with the explicit one of the same mesh at a Courant number of 0.1.
+"""
+
+# ruff: noqa: E402
+
+from __future__ import annotations
+
+import os
+
+for _name in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")
+
+import logging
+import time
+from collections.abc import Sequence
+from functools import cache, partial
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from cyclopts import Parameter
+
+from ..errors import SkfsinkError
+from ..fem import indicators
+from ..material import MATERIALS, GeneralMaterial, SinkLaw, limiter_of, material_from
+from ..methods.controls import ENERGY_TOLERANCE, ExplicitControls, HHTControls
+from ..run.display import Display
+from .chart import page
+from .meshes import SIDE, load_plate
+from .part import Part, Planned, Points
+from .plate import Front, Plate
+from .speed_accuracy import run_parts
+from .store import Store
+
+__all__ = ["strong_laws"]
+
+END = 60e-6                  # of the events [s]
+SCHEMES = {"explicit": 0.8, "explicit, Courant 0.1": 0.1, "hht": None}
+REFERENCE = "explicit, Courant 0.1"
+FLAG = Parameter(negative="", show_default=False)
+
+
+@cache
+def plate(law: str, element: str, seed: int) -> Plate:
+    """The plate of a law with its own limiter."""
+    return Plate(load_plate(f"plate{seed}"), material=material_from(law), law=SinkLaw(phi=limiter_of(law).phi),
+                 element=element)
+
+
+def event(law: str, element: str, seed: int, scheme: str) -> dict[str, Any]:
+    """An event of `END`: energies at its end, how far the crack has come, and what is lost on the way."""
+    body, courant = plate(law, element, seed), SCHEMES[scheme]
+    state = body.onset
+    state.begin_event(body.overshoot)
+    integrator = body.hht(HHTControls()) if courant is None else body.explicit(
+        ExplicitControls(courant=courant, energy_tolerance=ENERGY_TOLERANCE))
+    front, seen, way, why = Front(body.sample), state.gamma, 0.0, ""
+    cpu, arrival, worst = time.process_time(), None, 0.0
+    integrator.begin(state)
+    try:
+        for _ in integrator.run(state, END):
+            worst = max(worst, abs(state.ledger.numerical))
+            if state.gamma is not seen:
+                seen = state.gamma
+                way = max(way, front.tip(seen))
+                if arrival is None and way >= 1.0:
+                    arrival = state.time * 1e6
+    except SkfsinkError as error:
+        why = str(error)
+    ledger = state.ledger
+    inside_out = indicators.inverted(body.sample.space, state.u, body.momentum.gamma)
+    return {"law": law, "element": element, "seed": seed, "scheme": scheme,
+            "strength": body.law.phi / body.material.shear_modulus, "opening_mm": body.onset_figures["opening_mm"],
+            "ended_us": state.time * 1e6, "why": why, "numerical": ledger.numerical / ledger.initial,
+            "worst": worst / ledger.initial, "D": ledger.sink, "U": ledger.paper, "way_mm": way,
+            "passed_1mm_us": arrival, "steps": state.step, "rejected": integrator.rejected,
+            "live_inside_out": bool(inside_out[1] > 0.5), "cpu_s": time.process_time() - cpu}
+
+
+def plan(quick: bool) -> list[Planned]:
+    """Every law, element, mesh and scheme."""
+    laws = [(law, element) for law, kind in MATERIALS.items() for element in ("jbar", "planestress")
+            if element == "jbar" or not issubclass(kind, GeneralMaterial)]
+    return [Planned(f"{law}, {element}, mesh {seed}, {scheme}", partial(event, law, element, seed, scheme),
+                    {None: 10.0, 0.8: 3.0, 0.1: 15.0}[courant])
+            for law, element in laws for seed in range(1 if quick else 3) for scheme, courant in SCHEMES.items()
+            if not (quick and scheme == REFERENCE)]
+
+
+def table(points: Points) -> list[str]:
+    """A line for each law, element and scheme: the worst of the meshes, differences of the mean from the reference."""
+    lines = ["| law, $\\Phi/\\mu$ | element | opening at the onset | scheme | time reached | worst energy fed in or "
+             "lost | steps rejected | way of the crack [mm] | $D$ | processor time |", "|" + 10 * "---|"]
+    groups: dict[tuple[str, str, str], list[dict[str, Any]]] = {}
+    for p in points.values():
+        if "failed" not in p:
+            groups.setdefault((p["law"], p["element"], p["scheme"]), []).append(p)
+    for (law, element, scheme), group in groups.items():
+        reference = {p["seed"]: p for p in groups.get((law, element, REFERENCE), [])}
+        cells = [
+            f"`{law}`, {group[0]['strength']:.3g}", f"`{element}`",
+            f"{np.mean([p['opening_mm'] for p in group]) / SIDE:.0%}", scheme,
+            f"{min(p['ended_us'] for p in group):.0f} µs" + (", stopped" if any(p["why"] for p in group) else ""),
+            f"{max(p['worst'] for p in group):.2%}", f"{max(p['rejected'] / max(p['steps'], 1) for p in group):.1%}",
+            _against(group, reference, "way_mm"), _against(group, reference, "D"),
+            f"{np.mean([p['cpu_s'] for p in group]):.0f} s"]
+        lines.append("| " + " | ".join(cells) + " |")
+    return lines
+
+
+def _against(group: Sequence[dict[str, Any]], reference: dict[int, dict[str, Any]], name: str) -> str:
+    """Mean over the meshes, and its difference from that of the reference, with the greatest of a mesh."""
+    mean = float(np.mean([p[name] for p in group]))
+    if group[0]["scheme"] == REFERENCE or not all(p["seed"] in reference for p in group):
+        return f"{mean:.3g}"
+    shares = [p[name] / reference[p["seed"]][name] - 1 for p in group]
+    other = float(np.mean([reference[p["seed"]][name] for p in group]))
+    return f"{mean:.3g} ({mean / other - 1:+.1%}, a mesh {max(shares, key=abs):+.0%})"
+
+
+def _picture(points: Points, path: Path) -> None:
+    """Energy fed in or lost by each run."""
+    with page(path, "", 1, 1, 3.0, width=7.0) as axes:
+        names = list(dict.fromkeys((p["law"], p["element"]) for p in points.values() if "failed" not in p))
+        for k, scheme in enumerate(SCHEMES):
+            mine = [p for p in points.values() if p.get("scheme") == scheme]
+            axes[0].plot([names.index((p["law"], p["element"])) + 0.2 * (k - 1) for p in mine],
+                         [max(p["worst"], 1e-6) for p in mine], "os^"[k], markersize=4, fillstyle="none", label=scheme)
+        axes[0].axhline(3e-3, color="0.6", linewidth=0.6, linestyle=":")
+        axes[0].set(yscale="log", ylabel="energy fed in or lost (of the onset)")
+        axes[0].set_xticks(range(len(names)), [f"{law}\n{element}" for law, element in names], fontsize=5.5)
+        axes[0].legend(ncols=3)
+
+
+def strong_laws(*, quick: Annotated[bool, FLAG] = False, fresh: Annotated[bool, FLAG] = False,
+                out: Path = Path("results/study/strong_laws"), quiet: Annotated[bool, FLAG] = False) -> None:
+    """Run all laws at their own strength.
+
+    Parameters
+    ----------
+    quick
+        One mesh, and no reference.
+    fresh
+        Compute all points anew; without it, those in the folder are kept.
+    out
+        Folder for the figures and tables.
+    quiet
+        Show no progress.
+    """
+    logging.disable(logging.WARNING)
+    store = Store(out / "strong_laws.json", "strong_laws", fresh)
+    try:
+        with Display(quiet) as display:
+            run_parts(store, [Part("laws", plan, _picture, table)], quick, display)
+    finally:
+        logging.disable(logging.NOTSET)
+
+
+if __name__ == "__main__":
+    from ..cli.program import command
+
+    command(strong_laws, package="study")
