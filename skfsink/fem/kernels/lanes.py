@@ -47,10 +47,10 @@ def crush_factor(J):  # type: ignore[no-untyped-def]
 @njit(fastmath=FAST)
 def continue_below_floor(J, inverse, R):  # type: ignore[no-untyped-def]
     """R = J^(-2/3) and 1/J, found at `J_FLOOR` where J is below it, to what they are there; see :mod:`.crushed`."""
-    least = J[0]
+    count = 0
     for i in range(J.size):
-        least = J[i] if J[i] < least else least
-    if least < J_FLOOR:
+        count += J[i] < J_FLOOR
+    if count:
         for i in range(J.size):
             if J[i] < J_FLOOR:
                 R[i] *= crush_factor(J[i])
