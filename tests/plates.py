@@ -10,6 +10,7 @@ import signal
 import traceback
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from skfsink.cli.program import command
 from skfsink.meshing.sample import Sample, file_sample
 from skfsink.meshing.vtu import write_mesh
 from skfsink.run import compute
+from skfsink.system.files import HIDDEN
 
 os.environ["SKFSINK_DEBUG"] = "1"  # what should not happen is a traceback then
 DRAW = {name: getattr(compute, name) for name in ("draw_run", "draw_comparison")}
@@ -137,8 +139,10 @@ def drawing(draws: bool) -> Iterator[None]:
 
 
 def contents(folder: Path) -> dict[str, bytes]:
-    """Every file below a folder."""
-    return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
+    """Every file below a folder; without those of the lock where a system has no `fcntl`: a stale one goes there."""
+    left_out = () if find_spec("fcntl") else HIDDEN
+    return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*"))
+            if p.is_file() and p.name not in left_out}
 
 
 def figures(folder: Path) -> dict[str, Any]:

@@ -17,6 +17,8 @@ from plates import plate
 PEERS = Path(__file__).parent / "benchmarks" / "peers"
 sys.path.insert(0, str(PEERS))
 
+pytest.importorskip("resource")  # the benchmark measures memory with it
+
 import problem as problems  # noqa: E402
 import table  # noqa: E402
 from measure import measure  # noqa: E402
