@@ -27,8 +27,7 @@ def swinging(kind: str, steps: int, integrator: str, alpha: float = 0.0, end: fl
     state.u[:, 0] = 0.05 * np.sin(np.pi * y / 2)
     state.u[:, 1] = 0.025 * np.sin(np.pi * y / 2) * x
     if integrator == "explicit":
-        scheme = Explicit(held_body(momentum, density, free, still),
-                          ExplicitControls(gamma_every=10, energy_tolerance=1.0))
+        scheme = Explicit(held_body(momentum, density, free, still), ExplicitControls(gamma_every=10))
         scheme.length.fix(end / steps)
     else:
         scheme = HHT(held_body(momentum, density, free, still), HHTControls(alpha=alpha, dt=end / steps, **EXACT))

@@ -70,7 +70,7 @@ def test_explicit_scheme_is_stable_just_below_the_limit_and_not_above(kind: str,
     """
     momentum, density, free, state = body(kind, case)
     explicit = Explicit(held_body(momentum, density, free, np.zeros_like(state.u)),
-                        ExplicitControls(courant=0.98, gamma_every=10**6, energy_tolerance=1.0))
+                        ExplicitControls(courant=0.98, gamma_every=10**6))
     explicit.begin(state)
     explicit.length.look(0, state.u, explicit.mass, explicit._inverse)
     explicit.length.fix(explicit.dt * courant / 0.98)

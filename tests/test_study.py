@@ -17,7 +17,7 @@ from skfsink.cli.program import command
 from skfsink.errors import ConvergenceError, InstabilityError, Interrupted, OutputError
 from skfsink.methods.controls import ExplicitControls
 from skfsink.run.display import Display
-from skfsink.study import integrators, models, solvers, systems
+from skfsink.study import integrators, models, solvers, strong_laws, systems
 from skfsink.study.meshes import load_plate
 from skfsink.study.pareto import pareto_front
 from skfsink.study.part import Part, Planned
@@ -292,3 +292,17 @@ def test_documented_figures_are_those_of_the_file(tmp_path: Path):
         if name == "space":  # the others take long
             part.draw(points, tmp_path / f"{name}.png")
             assert (tmp_path / f"{name}.png").stat().st_size > 1e5
+
+
+def test_strong_laws_stand_beside_their_reference() -> None:
+    """Fails if an event of the study does not run to its end, or its table compares with another run or mesh.
+
+    The way of `other` is 10 % short of that of its reference; without a reference nothing is compared.
+    """
+    found = strong_laws.event("neo-hookean", "jbar", 0, "explicit")
+    assert found["why"] == "" and found["ended_us"] >= 60.0 and found["way_mm"] > 1.0 and found["worst"] < 3e-3
+    reference = {**found, "scheme": strong_laws.REFERENCE}
+    other = {**found, "way_mm": 0.9 * found["way_mm"]}
+    lines = strong_laws.table({"a": other, "b": reference, "c": {**other, "element": "planestress"}})
+    assert len(lines) == 5 and "(-10.0%, a mesh -10%)" in lines[2] and "(+0.0%, a mesh +0%)" in lines[2]
+    assert not any("a mesh" in line for line in lines[3:])

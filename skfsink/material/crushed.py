@@ -13,9 +13,14 @@ from __future__ import annotations
 
 import numpy as np
 
-__all__ = ["J_FLOOR", "crushed"]
+__all__ = ["J_FLOOR", "crush_factor", "crushed"]
 
 J_FLOOR = 0.02  #: J_0, below which a point is crushed
+
+
+def crush_factor(J, floor=J_FLOOR):  # type: ignore[no-untyped-def]
+    """The factor s below the floor; of numbers in compiled loops, of arrays beside them."""
+    return 1.0 + 2 / 3.0 * (1.0 - J / floor)
 
 
 def crushed(J: np.ndarray, floor: float = J_FLOOR) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -23,5 +28,5 @@ def crushed(J: np.ndarray, floor: float = J_FLOOR) -> tuple[np.ndarray, np.ndarr
     floored = np.maximum(J, floor)
     s = np.ones_like(floored)
     if floor > 0.0:
-        s = np.where(floor > J, 1.0 + 2 / 3.0 * (1.0 - J / floor), 1.0)
+        s = np.where(floor > J, crush_factor(J, floor), 1.0)
     return floored, s, floored * s

@@ -91,14 +91,13 @@ class StepLength:
         return 0.5 * self.dt * max(omega, self.momentum.stiffest(u, inverse) ** 0.5)
 
     def accepts(self, error: float, energy: float, initial: float) -> bool:
-        """Whether a step may be taken that feeds in the `error` of the `energy` of the body; else it is halved.
+        """Whether a step may be taken that feeds in the `error` of the `energy` of the body; it is halved if not.
 
         `initial` is the energy at the start, in which the error is measured where no step is rejected.
         """
         if self.controls.energy_tolerance == 0.0:
             self.urgent = self.urgent or error > self.FED_IN * initial
-            self.cut = 0 if np.isfinite(error) else self.CUTS + 1
-            return self.cut == 0
+            return bool(np.isfinite(error))
         if not (abs(error) <= self.controls.energy_tolerance * energy and np.isfinite(error)):
             self.rejected += 1
             self.cut += 1
@@ -114,8 +113,8 @@ class StepLength:
 
     @property
     def is_given_up(self) -> bool:
-        """Whether no step, however short, is taken any more."""
-        return self.cut > self.CUTS
+        """Whether a step that was not accepted is the end: the shortest one, or any where none is rejected."""
+        return self.cut > self.CUTS or self.controls.energy_tolerance == 0.0
 
     # --- checkpoints ---
     def memory(self) -> dict[str, Any]:

@@ -75,7 +75,9 @@ def run(scene: Scene, folder: str | Path, observers: Sequence[Observer] = (), *,
                              + (": a deck is run by read_deck(...).run()" if is_deck else ""))
     path = path_of("folder", folder)
     with Display(quiet) as display:
-        return _compute(scene, _Job(path, display, resume, check_observers(observers)), overwrite)
+        users = check_observers(observers)
+        parts = made_in_python(scene, find_case(scene.case)) if scene.case in CASES else ()  # no other case reads one
+        return _compute(scene, _Job(path, display, resume, users, made_in_python=parts), overwrite)
 
 
 def run_case(case: Case, arguments: dict[str, Any], options: Options) -> Result:
@@ -93,7 +95,7 @@ def run_case(case: Case, arguments: dict[str, Any], options: Options) -> Result:
         with Display(options.quiet) as display:
             if request.model_choice:
                 display.say(request.model_choice["text"])
-            job = _Job(request.folder, display, request.resumes, options.observers, request.notes, case)
+            job = _Job(request.folder, display, request.resumes, options.observers, request.notes)
             return _compute(request.scene(), job, request.options.overwrite, partial(_with_corridor, request))
     except (Interrupted, KeyboardInterrupt):
         begun = (request.folder / SCENE).exists()
@@ -111,7 +113,7 @@ def _how_to_go_on(request: RunRequest) -> str:
 class _Job:
     """Where a run goes, whether it goes on, who looks at it, and what it has to warn of at its beginning.
 
-    `case` made its scene, and `made_in_python` are the parts of this that are not as the case makes them.
+    `made_in_python` are the parts of its scene that are not as the case makes them; a case function leaves none.
     """
 
     folder: Path
@@ -119,7 +121,6 @@ class _Job:
     resumes: bool
     observers: tuple[Observer, ...] = ()
     notes: tuple[str, ...] = ()
-    case: Case | None = None
     made_in_python: tuple[str, ...] = ()
 
     def part(self, analysis: str, resumes: bool) -> _Job:
@@ -155,8 +156,7 @@ def _compute(scene: Scene, job: _Job, overwrite: bool,
             if remeshed is not scene:
                 _check(scene := remeshed, job)
         notes += _lock(locks, [place for place in folders if place not in before])
-        case = job.case or (find_case(scene.case) if scene.case in CASES else None)  # of no other case is a scene read
-        job = replace(job, notes=tuple(filter(None, notes)), made_in_python=made_in_python(scene, case) if case else ())
+        job = replace(job, notes=tuple(filter(None, notes)))
         return _run_both(scene, job) if both else _run_one(scene, job)
 
 

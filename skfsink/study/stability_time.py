@@ -50,7 +50,7 @@ def explicit(kind: str, courant: float) -> dict[str, Any]:
     """Growth a step of a disturbance of 1e-8 mm at a fixed step of `courant` times the predicted limit."""
     momentum, density, free, state = resting(kind)
     scheme = Explicit(Body(momentum, density, Loading.steady(momentum.space, free, np.zeros_like(state.u))),
-                      ExplicitControls(gamma_every=10**6, energy_tolerance=1.0))
+                      ExplicitControls(gamma_every=10**6))
     scheme.begin(state)
     omega, _ = highest_frequency(momentum, Pattern(momentum.space, 2, free, upper=True), free, state.u, scheme.mass,
                                  tolerance=1e-8)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...material import crushed
 from ...material.crushed import J_FLOOR
 from ...system.jit import njit
 
@@ -38,10 +39,7 @@ def refine_inverse_cbrt(J, r):  # type: ignore[no-untyped-def]
         J[i] = s * s * s
 
 
-@njit
-def crush_factor(J):  # type: ignore[no-untyped-def]
-    """The factor s of a crushed point, see :mod:`.crushed`."""
-    return 1.0 + 2 / 3.0 * (1.0 - J / J_FLOOR)
+crush_factor = njit(crushed.crush_factor)
 
 
 @njit(fastmath=FAST)
