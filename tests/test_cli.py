@@ -61,6 +61,7 @@ def test_numbers_out_of_range(name: str, tmp_path: Path) -> None:
     (["--side", "0.5"], ["notch", "0.5", "got 1"]),
     (["--analysis", "static"], ["analysis", "dynamic, quasistatic, both", "'static'"]),
     (["--integrator", "euler"], ["integrator", "explicit, hht", "'euler'"]),
+    (["--gradient", "vertex"], ["gradient", "monotone, gauss", "'vertex'"]),
     (["--sink", "heavy"], ["sink", "lumped, consistent, nearest", "'heavy'"]),
     (["--element", "q8"], ["element", "jbar, plain", "'q8'"]),
     (["--coupling", "none"], ["coupling", "iterated, single", "'none'"]),

@@ -115,7 +115,7 @@ def test_options_reach_what_they_are_named_after(kind: Any, option_of: dict[str,
         front=0.7, analysis="both", integrator="hht", sink="nearest", element="plain", overshoot=0.01, deletion=1e-5,
         force_floor=0.01, event_time=1e-4, aftermath=2e-5, record_every=2e-6, frame_every=3e-6, balance_tolerance=0.1,
         checkpoint_every=10.0, threads=2, active_zone=False, phi=0.2, m=8.0, length_scale=0.2, c1=0.5, c2=1.0,
-        bulk_modulus=400.0, density=1000.0, kernels="forms")
+        bulk_modulus=400.0, density=1000.0, kernels="forms", gradient="gauss")
     controls = changed.controls()
     made = {ExplicitControls: controls.explicit, HHTControls: controls.hht, StaticsControls: controls.statics,
             Controls: controls, SinkLaw: changed.sink_law(), AAA: changed.stored_energy()}[kind]
@@ -134,3 +134,4 @@ def test_what_fields_take_by_themselves() -> None:
     assert momentum["element"].default == Controls.element
     assert momentum["force_floor"].default == Controls.force_floor
     assert density["sink"].default == Controls.sink and density["active_zone"].default == Controls.active_zone
+    assert density["gradient"].default == Controls.gradient

@@ -60,7 +60,8 @@ def ends_well(of: Scene, state: State, folder: Path) -> None:
 OPTIONS = {
     "analysis": st.sampled_from(["dynamic", "dynamic", "dynamic", "quasistatic"]),
     "integrator": st.sampled_from(["explicit", "hht"]),
-    "sink": st.sampled_from(["lumped", "consistent", "nearest"]), "element": st.sampled_from(["jbar", "plain"]),
+    "sink": st.sampled_from(["lumped", "consistent", "nearest"]), "gradient": st.sampled_from(["monotone", "gauss"]),
+    "element": st.sampled_from(["jbar", "plain"]),
     "overshoot": st.sampled_from([1e-4, 0.01, 0.1]), "deletion": st.sampled_from([1e-9, 1e-6, 1e-2]),
     "force_floor": st.sampled_from([0.0, 1e-3, 0.1])}
 EXPLICIT = st.builds(ExplicitControls, courant=st.sampled_from([0.8, 1.0]), gamma_every=st.sampled_from([0, 1, 40]),

@@ -19,11 +19,13 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import skfem
 from skfem import BilinearForm, CellBasis, DiscreteField, LinearForm
 from skfem.assembly.form.form import FormExtraParams
 
 from ..errors import ParameterError
 from ..material import Material
+from . import kernels
 from .backend import Part
 from .elements import ELEMENTS
 from .forms import MomentumForms, density_forms, row_sums
@@ -61,9 +63,17 @@ class _Assembly:
         found: np.ndarray = form.elemental(self.basis, **fields).tolocal()
         return found
 
+    def matrices(self, form: BilinearForm, basis: CellBasis, **fields: Any) -> np.ndarray:
+        """Element matrices (ne, nd, nd), in the order of `Space.conn`."""
+        found: np.ndarray = form.elemental(basis, **fields).tolocal()[:, self._place[:, None], self._place]
+        return found
+
     def add_matrix(self, form: BilinearForm, pattern: Pattern, data: np.ndarray, **fields: Any) -> None:
         """Add the matrix to its `data` on the pattern."""
-        local = form.elemental(self.basis, **fields).tolocal()[:, self._place[:, None], self._place]
+        self.add(self.matrices(form, self.basis, **fields), pattern, data)
+
+    def add(self, local: np.ndarray, pattern: Pattern, data: np.ndarray) -> None:
+        """Add element matrices to the `data` on the pattern."""
         slot = pattern.slot[self.elements]
         kept = slot >= 0
         data += np.bincount(slot[kept], local[kept], data.size)
@@ -196,14 +206,29 @@ class AssembledDensity:
     """Matrices of the mass balance by its forms; see :class:`.DensityBackend`."""
 
     def __init__(self, space: Space, length_scale: float) -> None:
-        self._forms = density_forms(length_scale, 0.0)
+        self._space, self._forms = space, density_forms(length_scale, 0.0)
         self._assembly = _Assembly(space, space.gamma_basis, None)
 
-    def laplacian(self, pattern: Pattern) -> np.ndarray:
-        """Data of  int l^2 Grad N_a . Grad N_b  on a scalar pattern."""
+    def laplacian(self, pattern: Pattern, *, monotone: bool) -> np.ndarray:
+        """Data of the gradient term; see :class:`.DensityBackend`."""
         data = np.zeros(pattern.nnz)
-        self._assembly.add_matrix(self._forms.flux, pattern, data)
+        if monotone:
+            self._assembly.add(self._monotone(), pattern, data)
+        else:
+            self._assembly.add_matrix(self._forms.flux, pattern, data)
         return data
+
+    def _monotone(self) -> np.ndarray:
+        """Element matrices without positive off-diagonals, (ne, na, na), of those of the form by each rule."""
+        gauss, matrices, usable = self._assembly.basis, [], []
+        sense = np.sign(gauss.mapping.detDF(gauss.X))
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # of rules that are left out
+            for ends in range(2**self._space.dim):
+                basis = skfem.Basis(self._space.mesh, gauss.elem, quadrature=self._space.rule(ends))
+                matrices.append(self._assembly.matrices(self._forms.flux, basis))
+                jacobian = (sense * basis.mapping.detDF(basis.X)).min(axis=1)
+                usable.append(jacobian > kernels.LEAST_JACOBIAN * self._space.V)
+        return kernels.monotone(np.stack(matrices, axis=1), np.stack(usable, axis=1))
 
     def sink(self, pattern: Pattern, sink: np.ndarray) -> np.ndarray:
         """Data of  int sink N_a N_b  on a scalar pattern."""

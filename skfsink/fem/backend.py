@@ -86,8 +86,11 @@ class MomentumBackend(Protocol):
 class DensityBackend(Protocol):
     """Evaluates the matrices of the mass balance (Eq. 21, 24) on one mesh."""
 
-    def laplacian(self, pattern: Pattern) -> np.ndarray:
-        """Data of  int l^2 Grad N_a . Grad N_b  on a scalar pattern."""
+    def laplacian(self, pattern: Pattern, *, monotone: bool) -> np.ndarray:
+        """Data of  int l^2 Grad N_a . Grad N_b  on a scalar pattern.
+
+        If `monotone` no off-diagonal is positive (see :mod:`.gradient`), else it is integrated at the Gauss points.
+        """
 
     def sink(self, pattern: Pattern, sink: np.ndarray) -> np.ndarray:
         """Data of  int sink N_a N_b  on a scalar pattern; `sink` (ne, nq) is 1/(H + eps)."""

@@ -92,9 +92,10 @@ class CompiledDensity:
         self._space, self._length_scale = space, length_scale
         self.lump = space.lump
 
-    def laplacian(self, pattern: Pattern) -> np.ndarray:
-        """Data of  int l^2 Grad N_a . Grad N_b  on a scalar pattern."""
-        return kernels.laplacian(self._space, pattern, self._length_scale**2)
+    def laplacian(self, pattern: Pattern, *, monotone: bool) -> np.ndarray:
+        """Data of the gradient term; see :class:`.DensityBackend`."""
+        assemble = kernels.monotone_laplacian if monotone else kernels.laplacian
+        return assemble(self._space, pattern, self._length_scale**2)
 
     def sink(self, pattern: Pattern, sink: np.ndarray) -> np.ndarray:
         """Data of  int sink N_a N_b  on a scalar pattern."""

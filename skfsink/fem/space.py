@@ -22,13 +22,11 @@ from scipy.sparse import coo_array, csr_array
 
 from ..errors import MeshError
 from ..system.jit import njit
+from .quadrature import AXES, points, shape_functions
 
 __all__ = ["Space"]
 
 _ELEMENTS = {"quad": skfem.ElementQuad1, "hex": skfem.ElementHex1}
-#: reference axes in scikit-fem's numbering; its hexahedra are left-handed, so the first two change places
-_AXES = {2: [0, 1], 3: [1, 0, 2]}
-GAUSS = 0.5 - 0.5 / np.sqrt(3.0)  # abscissa of the first Gauss point on [0, 1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,12 +59,12 @@ class Space:
                             f"got {type(self.mesh).__name__}")
         dim = {"quad": 2, "hex": 3}[kind]
         mesh = self.mesh
-        reference = mesh.elem.refdom.p[_AXES[dim]].T.astype(int)
+        reference = mesh.elem.refdom.p[AXES[dim]].T.astype(int)
         order = np.argsort(reference @ (2 ** np.arange(dim)))
         X = np.ascontiguousarray(mesh.p.T)
         if not np.isfinite(X).all():
             raise MeshError("the mesh has a node whose coordinates are not finite numbers")
-        N, dN_ref = _reference(dim)
+        N, dN_ref = shape_functions(points(dim))
         for _ in range(2):
             conn = np.ascontiguousarray(mesh.t[order].T).astype(np.int64)
             J = np.einsum("eai,qak->eqik", X[conn], dN_ref)
@@ -122,18 +120,14 @@ class Space:
         return self.V ** (1 / self.dim)
 
     # --- scikit-fem bases, on the same Gauss points in the same order ---
-    @cached_property
-    def quadrature(self) -> tuple[np.ndarray, np.ndarray]:
-        """Points (dim, nq) and weights (nq,) on the unit square or cube."""
-        line = np.array([GAUSS, 1 - GAUSS])
-        grid = np.meshgrid(*[line] * self.dim, indexing="ij")
-        points = np.array([g.ravel(order="F") for g in grid])
-        return points[_AXES[self.dim]], np.full(2**self.dim, 0.5**self.dim)
+    def rule(self, ends: int = 0) -> tuple[np.ndarray, np.ndarray]:
+        """Points (dim, nq) and weights (nq,) in scikit-fem's axes, with `ends` as :func:`.points` takes it."""
+        return points(self.dim, ends).T[AXES[self.dim]], np.full(2**self.dim, 0.5**self.dim)
 
     @cached_property
     def gamma_basis(self) -> skfem.Basis:
         """Q1 basis of the relative density."""
-        return skfem.Basis(self.mesh, self._elements(_ELEMENTS), quadrature=self.quadrature)
+        return skfem.Basis(self.mesh, self._elements(_ELEMENTS), quadrature=self.rule())
 
     @cached_property
     def u_basis(self) -> skfem.Basis:
@@ -193,17 +187,6 @@ class Space:
         graph.sum_duplicates()
         graph.data[:] = 1
         return graph
-
-
-def _reference(dim: int) -> tuple[np.ndarray, np.ndarray]:
-    """Shape functions (nq, na) and reference gradients (nq, na, dim) at the Gauss points of the unit square or cube."""
-    index = np.array([[(a >> i) & 1 for i in range(dim)] for a in range(2**dim)])
-    xi = np.where(index, 1 - GAUSS, GAUSS)
-    factor = np.where(index[None], xi[:, None], 1 - xi[:, None])       # (q, a, i): value along direction i
-    slope = np.where(index, 1.0, -1.0)
-    N = factor.prod(axis=2)
-    dN = np.stack([slope[:, i] * np.delete(factor, i, axis=2).prod(axis=2) for i in range(dim)], axis=2)
-    return N, dN
 
 
 @njit(cache=True)

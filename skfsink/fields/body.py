@@ -36,6 +36,10 @@ class BodyControls(Protocol):
         """Name in :data:`.SINKS`."""
 
     @property
+    def gradient(self) -> str:
+        """Name in :data:`.GRADIENTS`."""
+
+    @property
     def active_zone(self) -> bool:
         """Whether gamma is solved for only where it changes."""
 
@@ -115,7 +119,7 @@ class Body:
         momentum = Momentum(space, scene.material, controls.element, controls.force_floor, threads,
                             regions=scene.regions, dead=loading.dead, kernels=controls.kernels)
         density = DensitySolver(space, scene.sink_law, controls.sink, active_zone=controls.active_zone,
-                                regions=scene.regions, kernels=controls.kernels)
+                                regions=scene.regions, kernels=controls.kernels, gradient=controls.gradient)
         return cls(momentum, density, loading, controls.deletion, threads)
 
     @property

@@ -2,8 +2,9 @@
 
     int l^2 Grad gamma . Grad dgamma + gamma dgamma/(H + eps) = int dgamma
 
-The sink term has several quadratures, see :mod:`.sinks`. Where it stays on the diagonal the system is solved by
-conjugate gradients with an algebraic multigrid preconditioner, else it is factorised.
+The matrix of the gradient term has no positive off-diagonals, unless it is asked for as the rule of Gauss gives it. The
+sink term has several quadratures, see :mod:`.sinks`. Where it stays on the diagonal the system is solved by conjugate
+gradients with an algebraic multigrid preconditioner, else it is factorised.
 """
 
 from __future__ import annotations
@@ -27,9 +28,12 @@ from ..system.jit import njit
 from .active_zone import ActiveZone, Zone
 from .sinks import SINKS
 
-__all__ = ["Density", "DensitySolver"]
+__all__ = ["GRADIENTS", "Density", "DensitySolver"]
 
 log = logging.getLogger(__name__)
+
+#: matrices of the gradient term: without positive off-diagonals (see :mod:`.gradient`), or as integrated by Gauss
+GRADIENTS = ("monotone", "gauss")
 
 
 class Density(NamedTuple):
@@ -66,6 +70,7 @@ class DensitySolver:
     active_zone: solves with a tolerance of their own are made where gamma changes (see :mod:`.active_zone`).
     regions: elements with limiters of their own; the length l and epsilon are those of `law`.
     kernels: what evaluates the weak forms, a name in :data:`.BACKENDS`.
+    gradient: one of :data:`GRADIENTS`, of the sinks that stay on the diagonal; that of others is always "gauss".
 
     Attributes
     ----------
@@ -77,9 +82,10 @@ class DensitySolver:
 
     def __init__(self, space: Space, law: SinkLaw, sink: str = "lumped", *, tolerance: float = 1e-8,
                  unchanged: float = 1e-12, active_zone: bool = True, regions: Sequence[Region] = (),
-                 kernels: str = "compiled") -> None:
-        if sink not in SINKS:
-            raise ParameterError(f"sink must be one of {', '.join(SINKS)}; got {sink!r}")
+                 kernels: str = "compiled", gradient: str = "monotone") -> None:
+        for name, value, allowed in (("sink", sink, SINKS), ("gradient", gradient, GRADIENTS)):
+            if value not in allowed:
+                raise ParameterError(f"{name} must be one of {', '.join(allowed)}; got {value!r}")
         self.space, self.law, self.sink, self._quadrature = space, law, sink, SINKS[sink]
         self.unchanged = unchanged
         check_lengths(law, regions)
@@ -91,7 +97,8 @@ class DensitySolver:
         self.pattern = Pattern(space)
         self.backend = backend(kernels).density(space, law.length_scale)
         self.load = self._lump(np.ones_like(space.w))
-        self._laplacian = self.backend.laplacian(self.pattern)
+        self._bounded = self._quadrature.monotone and gradient == "monotone"
+        self._laplacian = self.backend.laplacian(self.pattern, monotone=self._bounded)
         self._data, self._laplacian_diagonal = self._laplacian.copy(), self._laplacian[self.pattern.diagonal]
         self._direct: Factorization | None = None
         self._amg = AmgCG(self.pattern.matrix(self._assemble(np.ones_like(space.w))), tolerance)
@@ -128,7 +135,8 @@ class DensitySolver:
         Raises
         ------
         ConvergenceError
-            The history is not finite, or the lumped solution leaves (0, 1] by more than the solver's tolerance.
+            The history is not finite, or the solution with a sink on the diagonal leaves (0, 1] by more than its error:
+            with the gradient "gauss" on some meshes, with "monotone" on none but by rounding.
         """
         if not np.isfinite(W_max.max()):  # infinite, it would make a dead point in silence
             raise ConvergenceError("the stored energy of a Gauss point is not finite")
@@ -144,8 +152,9 @@ class DensitySolver:
         if result is None:
             result = self._factorise(data)
         if self._quadrature.monotone and not (-self._error < result.min() and result.max() < 1 + self._error):
-            raise ConvergenceError(f"the relative density left (0, 1]: {result.min():.3g} to {result.max():.6g}; the "
-                                   f"mesh has elements so flat that the lumped sink loses its maximum principle")
+            why = ("its equation was not solved accurately enough" if self._bounded else "the mesh has elements so tall, "
+                   "flat or distorted that gradient gauss has no maximum principle there: take gradient monotone")
+            raise ConvergenceError(f"the relative density left (0, 1]: {result.min():.3g} to {result.max():.6g}; {why}")
         return Density(result, sink, zones)
 
     def coefficients(self, W_max: np.ndarray) -> np.ndarray:

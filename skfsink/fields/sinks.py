@@ -1,7 +1,7 @@
 """Quadratures of the sink term  int gamma dgamma/(H + eps)  by name: adding one is its class, and a line in `SINKS`.
 
-"lumped" (the default) sums rows: the matrix is an M-matrix wherever the Laplacian's off-diagonals are not positive, and
-then 0 < gamma <= 1. "consistent" is the paper's form (Eq. 21, 24), whose sink varies by 1e15 inside an element: gamma
+"lumped" (the default) sums rows: with a gradient term without positive off-diagonals the matrix is an M-matrix, and
+0 < gamma <= 1. "consistent" is the paper's form (Eq. 21, 24), whose sink varies by 1e15 inside an element: gamma
 dips below zero next to a crack and conjugate gradients stall, so it is factorised. "nearest" gives each Gauss point to
 the node next to it.
 """
@@ -24,7 +24,7 @@ class Sink:
 
     Attributes
     ----------
-    monotone: whether it stays on the diagonal, so that 0 < gamma <= 1 on a mesh without very flat elements.
+    monotone: whether it stays on the diagonal, so that 0 < gamma <= 1 with the gradient "monotone".
     """
 
     monotone: ClassVar[bool] = True

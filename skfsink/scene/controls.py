@@ -10,6 +10,7 @@ import numba
 from ..errors import ParameterError, require
 from ..fem.backends import backend
 from ..fem.elements import ELEMENTS
+from ..fields.density import GRADIENTS
 from ..fields.sinks import SINKS
 from ..methods.controls import ExplicitControls, HHTControls, StaticsControls
 from ..methods.integrators import INTEGRATORS
@@ -36,6 +37,7 @@ class Controls:
     analysis: "dynamic" or "quasistatic" ("both" is two runs).
     integrator: "explicit" or "hht", for the dynamic event.
     sink: "lumped", "consistent" or "nearest".
+    gradient: "monotone" or "gauss", of the lumped and nearest sinks; that of the consistent one is always "gauss".
     element: "jbar", "plain" or "planestress" (thin sheets in two dimensions).
     overshoot: how far past the onset the state is scaled before the event, relative to the displacement, (0, 0.1].
     deletion: gamma at which an element fails, (0, 1e-2].
@@ -56,6 +58,7 @@ class Controls:
     analysis: str = "dynamic"
     integrator: str = "explicit"
     sink: str = "lumped"
+    gradient: str = "monotone"
     element: str = "jbar"
     overshoot: float = 0.005
     deletion: float = 1e-6
@@ -81,6 +84,7 @@ class Controls:
         if self.start == "rest" and self.analysis != "dynamic":
             raise ParameterError(f"start rest is for analysis dynamic; got {self.analysis}")
         choose("sink", self.sink, tuple(SINKS))
+        choose("gradient", self.gradient, GRADIENTS)
         choose("element", self.element, tuple(ELEMENTS))
         backend(self.kernels)
         require("overshoot", self.overshoot, low=0, high=0.1, low_open=True)

@@ -108,6 +108,9 @@ class Options:
         Characteristic length l of damage [mm], > 0.
     sink
         Quadrature of the sink: "lumped" (row sums), "consistent" (the paper's) or "nearest" (node).
+    gradient
+        Matrix of the gradient term of γ: "monotone" (keeps 0 < γ <= 1 on every mesh) or "gauss" (the paper's; that of
+        the consistent sink in any case).
     deletion
         γ at which an element fails, in (0, 0.01].
     force_floor
@@ -194,6 +197,7 @@ class Options:
     m: Annotated[float, SINK, Parameter(name=["--m"])] = SinkLaw.m
     length_scale: Annotated[float, SINK, Unit("mm")] = SinkLaw.length_scale
     sink: Annotated[str, SINK] = Controls.sink
+    gradient: Annotated[str, SINK] = Controls.gradient
     deletion: Annotated[float, SINK] = Controls.deletion
     force_floor: Annotated[float, SINK] = Controls.force_floor
     speed: Annotated[float, LOADING, Unit("mm/s")] = 1e-3

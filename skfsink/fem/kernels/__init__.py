@@ -8,13 +8,15 @@ general, general_tangent   force and tangent for laws of several invariants, and
 plane_stress       all of these for thin sheets
 pieces             elements of a region for the second derivatives
 scalar             mass, Laplacian and sink matrices
+gradient           the Laplacian without positive off-diagonals
 """
 
 from .general_tangent import tangent_general
+from .gradient import LEAST_JACOBIAN, monotone, monotone_laplacian
 from .plane_stress import tangent_plane_stress
 from .scalar import laplacian, mass, weighted_mass
 from .tangent import ERSATZ_STIFFNESS, SOFT_GAMMA, tangent
 from .tiles import Law, Tiles
 
-__all__ = ["ERSATZ_STIFFNESS", "SOFT_GAMMA", "Law", "Tiles", "laplacian", "mass", "tangent",
-           "tangent_general", "tangent_plane_stress", "weighted_mass"]
+__all__ = ["ERSATZ_STIFFNESS", "LEAST_JACOBIAN", "SOFT_GAMMA", "Law", "Tiles", "laplacian", "mass", "monotone",
+           "monotone_laplacian", "tangent", "tangent_general", "tangent_plane_stress", "weighted_mass"]
