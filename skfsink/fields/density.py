@@ -152,8 +152,8 @@ class DensitySolver:
         if result is None:
             result = self._factorise(data)
         if self._quadrature.monotone and not (-self._error < result.min() and result.max() < 1 + self._error):
-            why = ("its equation was not solved accurately enough" if self._bounded else "the mesh has elements so tall, "
-                   "flat or distorted that gradient gauss has no maximum principle there: take gradient monotone")
+            why = ("its equation was not solved accurately enough" if self._bounded else "the mesh has elements so "
+                   "tall, flat or distorted that gradient gauss has no maximum principle: take gradient monotone")
             raise ConvergenceError(f"the relative density left (0, 1]: {result.min():.3g} to {result.max():.6g}; {why}")
         return Density(result, sink, zones)
 
