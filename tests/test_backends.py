@@ -84,7 +84,7 @@ def test_all_that_the_momentum_balance_asks_for_is_equal(kind: str, element: str
 def test_gradient_term_is_equal(kind: str, gradient: str, aspect: float) -> None:
     """Fails if the matrix of the gradient term differs, on flat, square and tall elements, distorted or not.
 
-    Seen to fail with another rule, share or order of the axes in one of the two.
+    Seen to fail where one of the two moves positive off-diagonals without another rule.
     """
     for amount in (0.0, 0.2):
         mesh = box(kind, 6 if kind == "quad" else 3, amount).mesh
