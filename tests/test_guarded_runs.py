@@ -15,7 +15,7 @@ from skfsink.fields.density import DensitySolver
 from skfsink.fields.energy import Ledger
 from skfsink.fields.state import State
 from skfsink.material import SinkLaw
-from skfsink.methods.controls import ENERGY_TOLERANCE, ExplicitControls, HHTControls, StaticsControls
+from skfsink.methods.controls import ExplicitControls, HHTControls, StaticsControls
 from skfsink.methods.statics import Statics
 from skfsink.methods.step_length import StepLength
 from skfsink.run.display import Display
@@ -24,7 +24,7 @@ from skfsink.run.summarize import summarize
 from skfsink.study.plate import Plate
 
 
-@pytest.mark.parametrize("tolerance", [ENERGY_TOLERANCE, 0.0])
+@pytest.mark.parametrize("tolerance", [ExplicitControls.energy_tolerance, 0.0])
 def test_too_long_a_step_is_cut_or_stops_the_run_with_the_cure(tolerance: float, tmp_path: Path,
                                                                monkeypatch: pytest.MonkeyPatch):
     """Fails if a run whose step is too long goes on to NaN, or ends with an error that names no cure.

@@ -14,7 +14,7 @@ from skfsink.fields.density import Density, DensitySolver
 from skfsink.fields.momentum import Momentum
 from skfsink.fields.state import State
 from skfsink.material import AAA, SinkLaw
-from skfsink.methods.controls import ENERGY_TOLERANCE, ExplicitControls, HHTControls
+from skfsink.methods.controls import ExplicitControls, HHTControls
 from skfsink.methods.explicit import Explicit
 from skfsink.methods.hht import HHT
 
@@ -81,7 +81,7 @@ def test_steps_beyond_the_limit_are_cut(fracture: Fracture):
     with np.errstate(all="ignore"), pytest.raises(InstabilityError):
         for _ in range(60):
             explicit.step(state)
-    explicit, state = too_long(fracture, ENERGY_TOLERANCE)
+    explicit, state = too_long(fracture, ExplicitControls.energy_tolerance)
     for _ in range(400):
         explicit.step(state)
     assert explicit.rejected > 5 and abs(state.ledger.numerical) < 1e-3 * state.ledger.initial
@@ -92,7 +92,7 @@ def test_a_rejected_step_leaves_no_trace(fracture: Fracture):
     """Fails if what follows a rejected step depends on it: the fields, the ledger, the load time."""
     states = []
     for dt in (1.0, 0.5):
-        explicit, state = too_long(fracture, ENERGY_TOLERANCE)
+        explicit, state = too_long(fracture, ExplicitControls.energy_tolerance)
         explicit.length.fix(dt * 1e-4)  # 1e-4 s is rejected again and again; so is half of it, once less
         explicit.step(state)
         states.append((explicit, state))

@@ -7,12 +7,10 @@ from typing import Protocol
 
 from ..errors import ParameterError, require
 
-__all__ = ["COUPLINGS", "ENERGY_TOLERANCE", "MASSES", "EventControls", "ExplicitControls", "HHTControls",
-           "StaticsControls"]
+__all__ = ["COUPLINGS", "MASSES", "EventControls", "ExplicitControls", "HHTControls", "StaticsControls"]
 
 COUPLINGS = ("iterated", "single")
 MASSES = ("lumped", "consistent")
-ENERGY_TOLERANCE = 2e-5  #: of an explicit step, that serves for all laws at their own strength
 
 
 @dataclass(frozen=True)
@@ -34,8 +32,8 @@ class ExplicitControls:
     gamma_every: int = 0
     mass_floor: float = 1e-3
     estimate_every: int = 400
-    estimate_change: float = 0.05
-    energy_tolerance: float = 0.0
+    estimate_change: float = 0.1
+    energy_tolerance: float = 2e-5
 
     def __post_init__(self) -> None:
         require("courant", self.courant, low=0, high=1, low_open=True)

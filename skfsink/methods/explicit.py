@@ -30,7 +30,7 @@ from ..fields.deletion import delete_failed, left_in
 from ..fields.density import Density
 from ..fields.state import State
 from ..system.jit import njit
-from .controls import ENERGY_TOLERANCE, EventControls, ExplicitControls
+from .controls import EventControls, ExplicitControls
 from .step_length import StepLength
 
 __all__ = ["Explicit"]
@@ -175,7 +175,8 @@ class Explicit:
         if self.controls.energy_tolerance == 0.0:
             raise InstabilityError(
                 f"the explicit integration blew up at t = {state.time:.4g} s (step {state.step}): lower courant, now "
-                f"{self.controls.courant:g}, or reject such steps by an energy_tolerance of {ENERGY_TOLERANCE:g}")
+                f"{self.controls.courant:g}, or reject such steps by an energy_tolerance of "
+                f"{ExplicitControls.energy_tolerance:g}")
         speed = np.abs(np.nan_to_num(self._next[1], nan=np.inf)).max(axis=1)
         raise InstabilityError(
             f"no explicit step down to {self.length.dt:.2g} s keeps the energy of the body to "

@@ -139,7 +139,7 @@ class Options:
         Explicit steps between solves for γ, >= 0; 0 takes as many as fit in 0.03 l/c_s (0.1 µs), at most 20.
     energy_tolerance
         Energy that an explicit step may feed in or take out, of that of the body, in [0, 1]; else it is rejected and
-        halved. 0 rejects none; 2e-5 is for materials that fail at large stretches.
+        made again half as long. 0 rejects none.
     mass_floor
         Least lumped mass of a node, relative to the intact one, in [0, 1).
     hht_alpha

@@ -13,7 +13,7 @@ from matplotlib.colors import LogNorm
 from ..errors import SkfsinkError
 from ..fem import indicators
 from ..material import SinkLaw, Yeoh
-from ..methods.controls import ENERGY_TOLERANCE, ExplicitControls, HHTControls
+from ..methods.controls import ExplicitControls, HHTControls
 from ..pictures.plot import RED
 from .blocks import block
 from .part import Planned, Points
@@ -61,7 +61,7 @@ def _event(ratio: float, scheme: Integrator) -> dict[str, Any]:
 
 def explicit_event(ratio: float, courant: float, rejects: bool) -> dict[str, Any]:
     """The explicit scheme; without rejection steps are taken as they come."""
-    tolerance = ENERGY_TOLERANCE if rejects else 0.0
+    tolerance = ExplicitControls.energy_tolerance if rejects else 0.0
     controls = ExplicitControls(courant=courant, energy_tolerance=tolerance)
     return {"scheme": "explicit", "courant": courant, "rejects": rejects,
             **_event(ratio, plate(ratio).explicit(controls))}

@@ -27,7 +27,7 @@ from cyclopts import Parameter
 from ..errors import SkfsinkError
 from ..fem import indicators
 from ..material import MATERIALS, GeneralMaterial, SinkLaw, limiter_of, material_from
-from ..methods.controls import ENERGY_TOLERANCE, ExplicitControls, HHTControls
+from ..methods.controls import ExplicitControls, HHTControls
 from ..run.display import Display
 from .chart import page
 from .meshes import SIDE, load_plate
@@ -56,8 +56,7 @@ def event(law: str, element: str, seed: int, scheme: str) -> dict[str, Any]:
     body, courant = plate(law, element, seed), SCHEMES[scheme]
     state = body.onset
     state.begin_event(body.overshoot)
-    integrator = body.hht(HHTControls()) if courant is None else body.explicit(
-        ExplicitControls(courant=courant, energy_tolerance=ENERGY_TOLERANCE))
+    integrator = body.hht(HHTControls()) if courant is None else body.explicit(ExplicitControls(courant=courant))
     front, seen, way, why = Front(body.sample), state.gamma, 0.0, ""
     cpu, arrival, worst = time.process_time(), None, 0.0
     integrator.begin(state)
