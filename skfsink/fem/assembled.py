@@ -70,9 +70,9 @@ class _Assembly:
 
     def add_matrix(self, form: BilinearForm, pattern: Pattern, data: np.ndarray, **fields: Any) -> None:
         """Add the matrix to its `data` on the pattern."""
-        self.add(self.matrices(form, self.basis, **fields), pattern, data)
+        self.scatter(self.matrices(form, self.basis, **fields), pattern, data)
 
-    def add(self, local: np.ndarray, pattern: Pattern, data: np.ndarray) -> None:
+    def scatter(self, local: np.ndarray, pattern: Pattern, data: np.ndarray) -> None:
         """Add element matrices to the `data` on the pattern."""
         slot = pattern.slot[self.elements]
         kept = slot >= 0
@@ -213,7 +213,7 @@ class AssembledDensity:
         """Data of the gradient term; see :class:`.DensityBackend`."""
         data = np.zeros(pattern.nnz)
         if monotone:
-            self._assembly.add(self._monotone(), pattern, data)
+            self._assembly.scatter(self._monotone(), pattern, data)
         else:
             self._assembly.add_matrix(self._forms.flux, pattern, data)
         return data

@@ -60,7 +60,7 @@ class StepLength:
         self.mode: np.ndarray | None = None
 
     def fix(self, dt: float) -> None:
-        """Let every step be `dt` [s] long, whatever the limit is."""
+        """Let every step be `dt` [s] long, whatever the limit is; none is rejected."""
         self.fixed, self.dt = dt, dt
 
     def look(self, step: int, u: np.ndarray, mass: np.ndarray, inverse: np.ndarray) -> None:
@@ -95,7 +95,7 @@ class StepLength:
 
         `initial` is the energy at the start, in which the error is measured where no step is rejected.
         """
-        if self.controls.energy_tolerance == 0.0:
+        if not self._rejects:
             self.urgent = self.urgent or error > self.FED_IN * initial
             return bool(np.isfinite(error))
         if not (abs(error) <= self.controls.energy_tolerance * energy and np.isfinite(error)):
@@ -114,7 +114,11 @@ class StepLength:
     @property
     def is_given_up(self) -> bool:
         """Whether a step that was not accepted is the end: the shortest one, or any where none is rejected."""
-        return self.cut > self.CUTS or self.controls.energy_tolerance == 0.0
+        return self.cut > self.CUTS or not self._rejects
+
+    @property
+    def _rejects(self) -> bool:
+        return self.controls.energy_tolerance > 0.0 and not self.fixed
 
     # --- checkpoints ---
     def memory(self) -> dict[str, Any]:
