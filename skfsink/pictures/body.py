@@ -6,11 +6,10 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components
 
 from ..fem.space import Space
 from ..fields.crack import CRACKED
+from ..fields.fragments import joined
 from ..results.frame import SPENT, Frame
 
 __all__ = ["FACETS", "OBLIQUE", "Body", "View", "bodies", "body", "extent", "fastest",
@@ -152,9 +151,7 @@ def extent(space: Space, elements: np.ndarray, x: np.ndarray, gamma: np.ndarray)
     """Least and greatest x, y (2, 2) of the pieces of the body that are not small fragments; NaN if nothing is left."""
     if not len(elements):
         return np.full((2, 2), np.nan)
-    element, corner = np.nonzero(gamma >= SPENT)
-    touches = csr_array((np.ones(len(element), np.int8), (element, space.conn[elements[element], corner])))
-    _, piece = connected_components(touches @ touches.T, directed=False)
+    piece = joined(space.conn[elements], gamma >= SPENT)
     volume = np.bincount(piece, space.V[elements])
     kept = x[volume[piece] > LEAST_PIECE * volume.sum()].reshape(-1, 2)
     return np.array([kept.min(axis=0), kept.max(axis=0)])

@@ -126,6 +126,8 @@ def key_table(runs: Sequence[Run], labels: Sequence[str], waves: Sequence[tuple[
         _row("greatest speed over c_R", "", [_share(w, v, 1) for w, v in zip(waves, fastest)]),
         row("branches", "", "event", "max_branches"),
         row("came apart", "", "event", "separated"),
+        row("pieces at the end", "", "event", "pieces"),
+        row("of these debris, smaller than l", "", "event", "debris"),
         row("U at the first arrival", energy, "energy", "U_paper_at_arrival"),
         row("D at the first arrival", energy, "energy", "D_sink_at_arrival"),
         row("failed elements", "", "deleted_elements"),

@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from ..fields.fragments import fragments
+from ..results.frame import SPENT
 from ..results.history import history_units, load_name
 from ..results.summary import versions
 from ..scene.scene import Scene
@@ -49,7 +51,8 @@ def summarize(scene: Scene, simulation: Simulation) -> dict[str, Any]:
                   "first_arrival_pass": None if dynamic else tracker.arrival,
                   "mean_tip_speed_m_per_s": tracker.mean_speed() if dynamic else None,
                   "max_branches": tracker.max_branches, "separated": tracker.separated,
-                  "duration_s": state.time if dynamic and onset else None},
+                  "duration_s": state.time if dynamic and onset else None,
+                  **fragments(space, state.gamma, state.deleted, scene.sink_law.length_scale, SPENT)._asdict()},
         "energy": {"U_paper_at_arrival": crack.at_arrival.get("U_paper"), "U_paper_final": ledger.paper,
                    "D_sink_at_arrival": crack.at_arrival.get("D_sink"), "D_sink_final": ledger.sink,
                    "D_sink_stored": ledger.sink_stored, "D_sink_kinetic": ledger.sink_kinetic,
