@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bodies import boundary, box, close, ends, momentum_of, patchy, wavy
+from bodies import boundary, box, close, ends, held_body, momentum_of, patchy, wavy
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
@@ -14,6 +14,7 @@ from skfsink.fem.kernels import Tiles
 from skfsink.fem.pattern import Pattern
 from skfsink.fem.space import Space
 from skfsink.fields import stress
+from skfsink.fields.density import DensitySolver
 from skfsink.fields.momentum import Momentum
 from skfsink.material import (
     AAA,
@@ -28,9 +29,11 @@ from skfsink.material import (
     NeoHookean,
     SinkLaw,
     Yeoh,
+    limiter_of,
     material_from,
 )
-from skfsink.material.homogeneous import PATHS, curve, extent, peaks
+from skfsink.material.homogeneous import PATHS, curve, extent, peaks, wave_speed_at_failure
+from skfsink.methods.explicit import Explicit
 from skfsink.pictures.stress_curves import stress_picture
 
 TISSUE = {"k2": 2.0, "angle": 30.0, "axis": (1.0, 0.5, 0.3), "normal": (0.1, 0.2, 1.0)}  # pulled and slack fibres
@@ -475,3 +478,23 @@ def test_picture_draws_peaks_on_their_curves(tmp_path):
     law = SinkLaw()
     stress_picture(AAA(), law, peaks(AAA(), law), tmp_path / "a.svg")
     assert (tmp_path / "a.svg").read_text().count("MPa at") == 4
+
+
+@pytest.mark.parametrize("name", ["neo-hookean", "mooney-rivlin", "gent"])
+def test_wave_speed_at_failure_is_that_of_the_stretched_law(name: str):
+    """Fails if the wave is not that of the material stretched to Phi: of Gent's law c_s exp(Phi/(mu J_m)).
+
+    In the two others the wave across a tension is as fast as in the undeformed body.
+    """
+    material, law = material_from(name), SinkLaw(phi=limiter_of(name).phi)
+    found = wave_speed_at_failure(material, law) / material.shear_wave_speed
+    assert found == pytest.approx(np.exp(law.phi / (material.mu * material.limit)) if name == "gent" else 1.0, rel=1e-6)
+
+
+def test_density_is_solved_for_more_often_in_laws_that_stiffen():
+    """Fails if the interval between solves for gamma does not follow the waves at failure, or the tissue's changes."""
+    for name, shorter in (("neo-hookean", 1.0), ("aaa", 1.0), ("gent", 0.75 * 2.13)):
+        space = box("quad", 2)
+        body = held_body(Momentum(space, material_from(name)), DensitySolver(space, SinkLaw(phi=limiter_of(name).phi)),
+                         np.ones(2 * space.n_nodes, bool), np.zeros_like(space.X))
+        assert Explicit(body)._stiffening == pytest.approx(shorter, rel=2e-3)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -12,6 +13,7 @@ from ..errors import ParameterError
 from ..fem.space import Space
 from ..loads.schedule import Loading
 from ..material import Material, SinkLaw
+from ..material.homogeneous import wave_speed_at_failure
 from ..material.regions import Region
 from .density import DensitySolver
 from .momentum import Momentum
@@ -141,6 +143,12 @@ class Body:
     def least_energy(self) -> float:
         """Energy [N mm; N mm/mm in 2D] below which rounding is seen: 1e-6 of what a crack takes as it runs by l."""
         return 1e-6 * self.density.law.phi * self.density.law.length_scale ** self.space.dim
+
+    @cached_property
+    def wave_speed_at_failure(self) -> float:
+        """Greatest speed of :func:`.wave_speed_at_failure` among the materials [m/s]."""
+        pairs = zip(self.momentum.parts, self.density.parts, strict=True)
+        return max(wave_speed_at_failure(part.material, law) for part, (_, law) in pairs)
 
     def take(self, state: State) -> np.ndarray:
         """Bring the momentum balance to load time, density and displacement of a state; its force less dead loads."""

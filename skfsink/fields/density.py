@@ -74,6 +74,7 @@ class DensitySolver:
 
     Attributes
     ----------
+    parts: numbers of elements and their law, for each law that has some.
     phi, failure_energy: Phi and psi_f [MPa], numbers, or where regions differ one for each element, (ne, 1) and (ne,).
     solves, skipped: how often it was solved, and left out because H had not changed.
     iterations: conjugate-gradient iterations so far.
@@ -90,7 +91,8 @@ class DensitySolver:
         self.unchanged = unchanged
         check_lengths(law, regions)
         ne = space.n_elements
-        self._parts = [(rest_of(regions, ne), law), *((region.elements, region.sink_law) for region in regions)]
+        parts = [(rest_of(regions, ne), law), *((region.elements, region.sink_law) for region in regions)]
+        self.parts = [(elements, law) for elements, law in parts if elements.size]
         phi = by_element(ne, law.phi, regions, lambda region: region.sink_law.phi)
         self.phi = phi[:, None] if isinstance(phi, np.ndarray) else phi
         self.failure_energy = by_element(ne, law.failure_energy, regions, lambda region: region.sink_law.failure_energy)
@@ -159,10 +161,10 @@ class DensitySolver:
 
     def coefficients(self, W_max: np.ndarray) -> np.ndarray:
         """Sink coefficients 1/(H + eps) of Eq. (9, 10), (ne, nq), each element by its law."""
-        if len(self._parts) == 1:
-            return self.law.coefficients(W_max)
+        if len(self.parts) == 1:
+            return self.parts[0][1].coefficients(W_max)
         sink = np.empty_like(W_max)
-        for elements, law in self._parts:
+        for elements, law in self.parts:
             sink[elements] = law.coefficients(W_max[elements])
         return sink
 

@@ -15,7 +15,7 @@ from scipy.optimize import brentq, minimize_scalar
 
 from . import GeneralMaterial, Material, SinkLaw
 
-__all__ = ["PATHS", "Curve", "Path", "Peak", "curve", "extent", "peaks"]
+__all__ = ["PATHS", "Curve", "Path", "Peak", "curve", "extent", "peaks", "wave_speed_at_failure"]
 
 
 def _diagonal(*stretches: np.ndarray) -> np.ndarray:
@@ -126,6 +126,17 @@ def extent(material: Material, law: SinkLaw, path: Path, gamma: float = 1e-3) ->
 
 def _at(path: Path, strain: float) -> float:
     return float(np.exp(strain)) if path.start == 1.0 else strain
+
+
+def wave_speed_at_failure(material: Material, law: SinkLaw) -> float:
+    """Speed of a transverse wave along the way of a crack, where W has come to Phi [m/s, of the undeformed body].
+
+    The material is stretched in plane strain, the wave runs at right angles to that: sqrt(A_1212/rho0), A being dP/dF.
+    Without fibres A_1212 = 2 dpsi/dI1. A law that stiffens has a faster one than c_s.
+    """
+    path = PATHS["plane strain"]
+    F = path.gradient(material, np.array([extent(material, law, path, float(np.exp(-1)))]))
+    return float(np.sqrt(material.modulus(F)[0, 0, 1, 0, 1] / material.rho0)) * 1e-3
 
 
 def peaks(material: Material, law: SinkLaw) -> dict[str, Peak]:

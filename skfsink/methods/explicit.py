@@ -55,7 +55,8 @@ class Explicit:
     """
 
     GAMMA_INTERVAL = 0.03  # l/c_s between solves for gamma; the crack then runs less than 3 % of l
-    GAMMA_MOST = 20  # steps between them at the most, lest a failing element that shortens the step keeps failing
+    STIFFENING = 4 / 3  # waves at failure faster than this times c_s, as in the tissue, make them more frequent
+    GAMMA_MOST = 10  # steps between them at the most, lest a failing element that shortens the step keeps failing
     GAMMA_TOLERANCE = 1e-6  # relative residual of a solve for gamma
     _REMEMBERED = ("_elastic", "_since_gamma")
 
@@ -69,6 +70,7 @@ class Explicit:
         self._grip_velocity, self._knot = self.loading.velocity(0.0), np.inf
         self._mass_floor = max(self.controls.mass_floor, 1e-12)  # a node without mass or force stays where it is
         self.length = StepLength(self.momentum, self.free, self.controls, self._interval)
+        self._stiffening = max(1.0, body.wave_speed_at_failure / self.momentum.shear_wave_speeds[1] / self.STIFFENING)
         self._since_gamma = 0
         self._zones: tuple[Zone, ...] = ()
 
@@ -227,11 +229,11 @@ class Explicit:
         """Steps between solves for gamma."""
         if self.controls.gamma_every:
             return self.controls.gamma_every
-        return min(max(1, int(self._interval / self.dt)), self.GAMMA_MOST)
+        return min(max(1, int(self._interval / self._stiffening / self.dt)), self.GAMMA_MOST)
 
     @property
     def _interval(self) -> float:
-        """Longest time between solves for gamma that leaves the motion of a crack accurate, in any material [s]."""
+        """Longest time between solves for gamma, and longest step, by the waves of the undeformed body [s]."""
         return self.GAMMA_INTERVAL * self.density.law.length_scale / (self.momentum.shear_wave_speeds[1] * 1e3)
 
     # --- the step size ---

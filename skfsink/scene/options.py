@@ -136,7 +136,7 @@ class Options:
     courant
         Explicit step over the stability limit estimated for the deformed state, in (0, 1].
     gamma_every
-        Explicit steps between solves for γ, >= 0; 0 takes as many as fit in 0.03 l/c_s (0.1 µs), at most 20.
+        Explicit steps between solves for γ, >= 0; 0 takes as many as fit in 0.03 l/c_s (0.1 µs), at most 10.
     energy_tolerance
         Energy that an explicit step may feed in or take out, of that of the body, in [0, 1]; else it is rejected and
         made again half as long. 0 rejects none.
