@@ -15,6 +15,7 @@ from ..loads.schedule import Loading
 from ..material import Material, SinkLaw
 from ..material.homogeneous import wave_speed_at_failure
 from ..material.regions import Region
+from .contact import Contact
 from .density import DensitySolver
 from .momentum import Momentum
 from .state import State
@@ -52,6 +53,10 @@ class BodyControls(Protocol):
     @property
     def deletion(self) -> float:
         """Gamma at which an element fails."""
+
+    @property
+    def contact(self) -> bool:
+        """Whether the lips of cracks bear on each other."""
 
     def workers(self, dim: int) -> int:
         """Threads for a body of that dimension."""
@@ -120,6 +125,8 @@ class Body:
         threads = controls.workers(space.dim)
         momentum = Momentum(space, scene.material, controls.element, controls.force_floor, threads,
                             regions=scene.regions, dead=loading.dead, kernels=controls.kernels)
+        if controls.contact:
+            momentum.contact = Contact(space, momentum.parts, loading.free)
         density = DensitySolver(space, scene.sink_law, controls.sink, active_zone=controls.active_zone,
                                 regions=scene.regions, kernels=controls.kernels, gradient=controls.gradient)
         return cls(momentum, density, loading, controls.deletion, threads)

@@ -8,7 +8,7 @@ mass that disappears:
 The ledger keeps D in its two parts beside the energy of the paper, U = sum over failed elements of A_i psi_f
 (Eq. 30, 32), which is a measure of the failed area and does not enter the balance:
 
-    elastic + loads + kinetic + D + deletion + numerical + released = initial + external work.
+    elastic + loads + contact + kinetic + D + deletion + numerical + released = initial + external work.
 
 Every entry is computed from its own definition; none is what is left over from the others.
 """
@@ -34,10 +34,12 @@ class Ledger:
     initial: elastic and kinetic energy, and potential of the dead loads, at the start of the ledger.
     elastic: gamma-weighted stored energy.
     loads: potential -f.u of the dead loads.
+    contact: energy of the medium between the lips of cracks; see :mod:`.contact`.
     kinetic: gamma-weighted kinetic energy.
     work: work of the grips, and -u.df of dead loads f that change.
     sink_stored, sink_kinetic: the two parts of D.
-    deletion: stored and kinetic energy of elements at the moment they were deleted.
+    deletion: stored and kinetic energy of elements at the moment they were deleted, less that with which they come into
+        contact, and what contact loses as nodes of the lips lose their mass.
     numerical: dissipation of the scheme, from its own identity (negative: it fed energy in).
     released: energy a quasi-static analysis gives up in relaxing at fixed gamma; a dynamic one turns it into motion.
     paper: U of the paper.
@@ -54,6 +56,7 @@ class Ledger:
     numerical: float = 0.0
     released: float = 0.0
     paper: float = 0.0
+    contact: float = 0.0
 
     @property
     def sink(self) -> float:
@@ -64,7 +67,7 @@ class Ledger:
     def balance(self) -> float:
         """What does not close: left side minus right side of the balance."""
         return (self.elastic + self.loads + self.kinetic + self.sink + self.deletion + self.numerical + self.released
-                - self.initial - self.work)
+                - self.initial - self.work + self.contact)
 
     @property
     def turnover(self) -> float:

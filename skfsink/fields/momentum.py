@@ -15,6 +15,7 @@ from ..fem.space import Space
 from ..loads.nodal import NodalLoads
 from ..material import GeneralMaterial, Material
 from ..material.regions import Region, by_element, rest_of
+from .contact import Contact
 
 __all__ = ["Momentum", "Part"]
 
@@ -23,7 +24,8 @@ class Momentum:
     """Internal force and its derivatives (Eq. 14-19, 28) for the relative density last given.
 
     Memory: the density last given to `set_gamma` and the load time last given to `set_time`: `force`, `tangent`,
-    `stiffest` and the masses are for these. `potential`, `W` and `energy` are of the last `force`.
+    `stiffest` and the masses are for these. `potential`, `W` and `energy` are of the last `force`. `contact` is set
+    once.
 
     Parameters
     ----------
@@ -42,6 +44,7 @@ class Momentum:
     backend: what evaluates the weak forms.
     rho0: density of the intact solid [t/mm^3], a number, or where materials differ one for each element (ne, 1).
     shear_moduli, shear_wave_speeds: least and greatest of the materials [MPa; m/s].
+    contact: the medium between the lips of cracks, if there is to be one; :meth:`force` contains its force.
     energy: gamma-weighted stored energy at the last evaluation [N mm; N mm/mm in 2D].
     loads: potential -f.u of the dead loads at the last evaluation, in the same units.
     least_J: least J (plane stress: its part in the plane) at a Gauss point with gamma > 0 at the last evaluation.
@@ -62,9 +65,10 @@ class Momentum:
         self.rho0 = rho0[:, None] if isinstance(rho0, np.ndarray) else rho0
         self.energy = self.loads = 0.0
         self.dead = dead
+        self.contact: Contact | None = None
         self.least_J = 1.0
         self.evaluations = 0
-        self._intact = self._lumped(np.ones_like(space.w))
+        self._intact = self._mass = self._lumped(np.ones_like(space.w))
         self._gamma: np.ndarray | None = np.ones_like(space.w)
         self.backend.set_gamma(self._gamma)
 
@@ -111,7 +115,11 @@ class Momentum:
         if self.dead is not None:
             nodes, e = self.space.conn[self.dead.elements], self.dead.elements
             self.dead.keep(((gamma[nodes] @ self.space.N.T >= self.force_floor) & ~deleted[e, None]).any(axis=1))
-        return self.backend.relax(gamma, deleted, self.force_floor)
+        taken = self.backend.relax(gamma, deleted, self.force_floor)
+        if self.contact is not None:
+            self._mass = self._lumped(self.gamma)
+            self.contact.update(self.gamma, self._mass, self._intact)
+        return taken
 
     def set_time(self, t: float) -> None:
         """Use the dead loads of load time `t` [s] from now on."""
@@ -120,20 +128,29 @@ class Momentum:
 
     @property
     def potential(self) -> float:
-        """Stored energy and potential of the dead loads at the last evaluation: `force` is its derivative."""
-        return self.energy + self.loads
+        """Stored energy, contact and potential of the dead loads at the last evaluation: `force` is its derivative."""
+        return self.energy + self.loads + self.pressed
+
+    @property
+    def pressed(self) -> float:
+        """Energy of the medium between the lips of cracks, of its last evaluation [N mm; N mm/mm in 2D]."""
+        return 0.0 if self.contact is None else self.contact.energy
 
     def force(self, u: np.ndarray, out: np.ndarray | None = None) -> np.ndarray:
         """Internal force at the displacement `u` less the dead loads, (n, dim) [N; N/mm in 2D].
 
-        Sets `energy`, `loads`, `least_J` and `W`.
+        Sets `energy`, `loads`, `least_J` and `W`. With `contact`, nodes without mass are moved in `u` to where they
+        follow the lips.
         """
         out = np.empty_like(self.space.X) if out is None else out
+        placed = u if self.contact is None else self.contact.place(u)
         self.least_J = self.backend.force(u, out)
         self.energy = self.backend.energy
         if self.dead is not None:
             out[self.dead.nodes] -= self.dead.values
             self.loads = self.dead.potential(u)
+        if self.contact is not None:
+            self.contact.add_force(placed, out)
         self.evaluations += 1
         return out
 
@@ -159,8 +176,15 @@ class Momentum:
         return self.backend.mass(pattern, self.gamma)
 
     def lumped_mass(self, floor: float) -> np.ndarray:
-        """Row sums (n,) [t; t/mm in 2D] of Eq. (28), at least `floor` times those of the intact solid."""
-        return np.maximum(self._lumped(self.gamma), floor * self._intact)
+        """Row sums (n,) [t; t/mm in 2D] of Eq. (28), at least `floor` times those of the intact solid.
+
+        With `contact`, nodes that follow the lips have none.
+        """
+        if self.contact is None:
+            return np.maximum(self._lumped(self.gamma), floor * self._intact)
+        mass = np.maximum(self._mass, floor * self._intact)
+        mass[self.contact.massless.any(axis=1)] = 0.0
+        return mass
 
     def _lumped(self, gamma: np.ndarray) -> np.ndarray:
         """Row sums (n,) of the mass matrix."""

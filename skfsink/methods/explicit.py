@@ -88,22 +88,27 @@ class Explicit:
         self.reaction = self.momentum.force(state.u)
         self._W = self.momentum.backend.W
         self._W_max = self.momentum.backend.tile(state.W_max)
-        self._elastic = self.momentum.energy
+        self._elastic, self._pressed = self.momentum.energy, self.momentum.pressed
         self._spare, self._du = np.empty_like(self.reaction), np.empty_like(self.reaction)
         self._next = np.empty_like(state.u), np.empty_like(state.u), np.empty_like(state.u)
 
     def _set_mass(self) -> None:
         self.mass = self.momentum.lumped_mass(self._mass_floor)
-        self._inverse = self._free / self.mass[:, None]  # zero where a degree of freedom is held
+        contact = self.momentum.contact
+        self._moving = self._free if contact is None else self._free & ~contact.massless
+        mass = self.mass[:, None]
+        self._inverse = np.divide(self._moving, mass, out=np.zeros(self._free.shape), where=mass > 0.0)  # 0 where held
 
     def begin(self, state: State) -> None:
         """Set the body in motion: accelerations from the forces, energies of the start."""
         self.start(state)
         np.copyto(state.v, self._grip_velocity, where=~self._free)
-        state.a[...] = np.where(self._free, -self.reaction / self.mass[:, None], 0.0)
+        np.divide(-self.reaction, self.mass[:, None], out=state.a, where=self._inverse > 0.0)
+        state.a[self._inverse == 0.0] = 0.0
         state.ledger.initial = state.ledger.elastic = self._elastic
         state.ledger.kinetic, state.ledger.loads = self._kinetic(state), self.momentum.loads
-        state.ledger.initial += state.ledger.kinetic + state.ledger.loads
+        state.ledger.contact = self._pressed
+        state.ledger.initial += state.ledger.kinetic + state.ledger.loads + self._pressed
 
     def _kinetic(self, state: State) -> float:
         return float(self.mass @ _half_square(state.v))
@@ -142,17 +147,18 @@ class Explicit:
         old, before = self.reaction, None if dead is None else dead.values
         self.momentum.set_time(grip)
         (u, v, a), du = self._next, self._du
-        _move((state.u, state.v, state.a), self._free, self._grip_velocity, dt, (u, v, du))
+        _move((state.u, state.v, state.a), self._moving, self._grip_velocity, dt, (u, v, du))
         force = self.momentum.force(u, self._spare)
         trapezoid, held, kinetic, swing = _kick((v, state.a, a), self._inverse, self.mass, (old, force), du, dt)
         ledger = state.ledger
-        elastic = self.momentum.energy
-        energy_fed_in = dt * dt / 8 * swing + (elastic - self._elastic) - trapezoid
+        elastic, pressed = self.momentum.energy, self.momentum.pressed
+        energy_fed_in = dt * dt / 8 * swing + (elastic - self._elastic) + (pressed - self._pressed) - trapezoid
         if dead is not None and before is not None:
             energy_fed_in -= dead.effort(before, du)
-        energy, initial = max(abs(ledger.initial), elastic + kinetic, self.body.least_energy), ledger.initial
+        present, initial = elastic + pressed + kinetic, ledger.initial
+        energy = max(abs(initial), present, self.body.least_energy)
         if dead is not None:
-            initial = max(abs(initial), elastic + kinetic)
+            initial = max(abs(initial), present)
         if not self.length.accepts(energy_fed_in, energy, initial):
             self.momentum.set_time(state.grip)
             return False
@@ -166,6 +172,7 @@ class Explicit:
         ledger.numerical -= energy_fed_in
         ledger.work += held
         ledger.elastic = self._elastic = elastic
+        ledger.contact = self._pressed = pressed
         ledger.kinetic = kinetic
         state.time += dt
         state.grip = grip
@@ -219,10 +226,24 @@ class Explicit:
         self._elastic -= stored
         ledger.elastic = self._elastic
         ledger.kinetic = float(self.mass @ half_v2)
+        self._renew_contact(state)
 
     def sync(self, state: State) -> None:
-        """Bring `state.W_max` up to date; between density solves the integrator keeps it tiled."""
+        """Bring `state.W_max`, and the motion of nodes that follow the lips, up to date."""
         state.W_max = self.momentum.backend.untile(self._W_max)
+        if self.momentum.contact is not None:
+            self.momentum.contact.place(state.v)
+            self.momentum.contact.place(state.a)
+
+    def _renew_contact(self, state: State) -> None:
+        """Book the energy that the medium has more, or less, at fixed displacement since density has fallen."""
+        contact = self.momentum.contact
+        if contact is None:
+            return
+        self.reaction[contact.massless] = 0.0
+        before, self._pressed = self._pressed, contact.renew(contact.place(state.u))
+        state.ledger.deletion += before - self._pressed
+        state.ledger.contact = self._pressed
 
     @property
     def _gamma_every(self) -> int:
@@ -260,7 +281,8 @@ class Explicit:
     def memory(self) -> dict[str, np.ndarray]:
         """What the integrator remembers beyond the state, for a checkpoint."""
         return {"reaction": self.reaction, "zone_depths": np.array([zone.depth for zone in self._zones], int),
-                **{name: np.array(getattr(self, name)) for name in self._REMEMBERED}, **self.length.memory()}
+                **{name: np.array(getattr(self, name)) for name in self._REMEMBERED}, **self.length.memory(),
+                **({} if self.momentum.contact is None else {"contact_rest": self.momentum.contact.rest})}
 
     def restore(self, state: State, memory: dict[str, np.ndarray]) -> None:
         """Go on exactly where :meth:`memory` was taken."""
@@ -269,6 +291,8 @@ class Explicit:
         for name in self._REMEMBERED:
             setattr(self, name, memory[name].item())
         self.length.restore(memory)
+        if (contact := self.momentum.contact) is not None:
+            self._pressed = contact.restore(memory["contact_rest"], contact.place(state.u))
         if self.density.zone is not None:
             self._zones = tuple(self.density.zone.of_depth(depth) for depth in memory["zone_depths"])
 

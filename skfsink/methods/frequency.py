@@ -22,13 +22,15 @@ def highest_frequency(momentum: Momentum, pattern: Pattern, free: np.ndarray, u:
     """Highest eigenfrequency omega [rad/s] of  K(u) x = omega^2 M x  over the free unknowns, and its vector.
 
     Lanczos on the mass-scaled tangent of the deformed, damaged body. `start` is a starting vector, best the result of
-    the last call. The estimate approaches from below, by about `tolerance`.
+    the last call. The estimate approaches from below, by about `tolerance`. Nodes without mass do not swing. Contact is
+    not in it.
     """
     if not pattern.size:  # every node is held: nothing swings
         return 0.0, np.zeros(0)
     indptr, indices = pattern.indptr.view(np.uint32), pattern.indices.view(np.uint32)
     data = momentum.tangent(pattern, u)
-    _scale(indptr, indices, data, 1.0 / np.sqrt(np.repeat(mass, momentum.space.dim)[free]))
+    root = np.sqrt(np.repeat(mass, momentum.space.dim)[free])
+    _scale(indptr, indices, data, np.divide(1.0, root, out=np.zeros_like(root), where=root > 0.0))
     # The highest mode sits in one element, and the next one may sit in another, where the last result is zero: add
     # a vector that reaches everywhere, has no symmetry, and is the same every time.
     everywhere = np.sin(1.0 + np.arange(pattern.size) * 2.399963) * np.sqrt(2.0 / pattern.size)

@@ -82,13 +82,19 @@ class StepLength:
             self.estimates += 1
             self.urgent = False
         swings = self._omega > 0.0  # else every node is held
-        dt = float(c.courant * 2.0 / (self._omega * np.sqrt(max(1.0, ratio)))) if swings else self._still
+        omega = self._with_contact(self._omega * np.sqrt(max(1.0, ratio)), u)
+        dt = float(c.courant * 2.0 / omega) if swings else self._still
         self.dt = min(dt, self._longest) * 0.5**self.cut  # in plane stress the stable step may be longer
 
     def share(self, u: np.ndarray, mass: np.ndarray, inverse: np.ndarray) -> float:
         """The step over the stability limit of a body as it is now; nothing is changed."""
         omega, _ = highest_frequency(self.momentum, self._pattern, self.free, u, mass, self.mode)
-        return 0.5 * self.dt * max(omega, self.momentum.stiffest(u, inverse) ** 0.5)
+        return 0.5 * self.dt * self._with_contact(max(omega, self.momentum.stiffest(u, inverse) ** 0.5), u)
+
+    def _with_contact(self, omega: float, u: np.ndarray) -> float:
+        """Bound of the highest frequency with contact, from that without it [1/s]."""
+        contact = self.momentum.contact
+        return omega if contact is None else float((omega**2 + contact.stiffest(u)) ** 0.5)
 
     def accepts(self, error: float, energy: float, initial: float) -> bool:
         """Whether a step may be taken that feeds in the `error` of the `energy` of the body; it is halved if not.

@@ -46,6 +46,7 @@ HISTORY_COLUMNS: dict[str, Column] = {
     "reaction_N_per_mm": Column("force on a grip along its motion", _FORCE),
     "elastic": Column("gamma-weighted stored energy", _ENERGY),
     "loads": Column("potential of the dead loads", _ENERGY, before=0.0),
+    "contact": Column("energy of the lips of cracks that bear on each other", _ENERGY, before=0.0),
     "kinetic": Column("gamma-weighted kinetic energy", _ENERGY),
     "work": Column("work of the grips, and of dead loads that change", _ENERGY),
     "sink_stored": Column("stored energy taken by the sink, the first part of D", _ENERGY),

@@ -40,6 +40,7 @@ FIELD_UNITS = {"displacement": "mm", "velocity": "mm/s", "gamma": "1", "deleted"
 ENERGIES: tuple[tuple[str, tuple[str, ...], str], ...] = (
     ("elastic", ("elastic",), "elastic energy, γ-weighted"),
     ("kinetic", ("kinetic",), "kinetic energy, γ-weighted"),
+    ("contact", ("contact",), "of the lips of cracks that bear on each other"),
     ("D", ("sink_stored", "sink_kinetic"), "D, taken by the sink"),
     ("D_stored", ("sink_stored",), "of D: from stored energy"),
     ("D_kinetic", ("sink_kinetic",), "of D: from motion"),

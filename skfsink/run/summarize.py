@@ -58,7 +58,7 @@ def summarize(scene: Scene, simulation: Simulation) -> dict[str, Any]:
                    "D_sink_stored": ledger.sink_stored, "D_sink_kinetic": ledger.sink_kinetic,
                    "initial": ledger.initial, "elastic_final": ledger.elastic, "kinetic_final": ledger.kinetic,
                    "external_work": onset.get("work", 0.0) + ledger.work, "deletion": ledger.deletion,
-                   "numerical": ledger.numerical, "released": ledger.released,
+                   "numerical": ledger.numerical, "released": ledger.released, "contact": ledger.contact,
                    "balance_error_relative": max(balances, default=0.0) / onset["elastic_energy"] if onset else None},
         "quantities": measured(scene, simulation), "model": dict(scene.model_choice) or None,
         "whole": {"energy": scene.whole.energy, "load": scene.whole.load, "displacement": scene.whole.displacement},

@@ -52,6 +52,7 @@ class Controls:
         OMP_NUM_THREADS or the machine's cores, at most 4. Runs with the same number agree to the last bit.
     start: of a dynamic analysis, "onset" (statics up to there) or "rest" (see :mod:`.rest`).
     active_zone: explicit steps solve for gamma only where it changes (see :mod:`.active_zone`).
+    contact: the lips of cracks bear on each other (see :mod:`.contact`), in explicit events.
     kernels: "compiled", or "forms" (scikit-fem forms, for small meshes), or another name in :data:`.BACKENDS`.
     """
 
@@ -72,6 +73,7 @@ class Controls:
     threads: int = 0
     start: str = "onset"
     active_zone: bool = True
+    contact: bool = False
     kernels: str = "compiled"
     explicit: ExplicitControls = field(default_factory=ExplicitControls)
     hht: HHTControls = field(default_factory=HHTControls)
@@ -83,6 +85,9 @@ class Controls:
         choose("start", self.start, STARTS)
         if self.start == "rest" and self.analysis != "dynamic":
             raise ParameterError(f"start rest is for analysis dynamic; got {self.analysis}")
+        if self.contact and (self.analysis, self.integrator) != ("dynamic", "explicit"):
+            asked = f"integrator {self.integrator}" if self.analysis == "dynamic" else f"analysis {self.analysis}"
+            raise ParameterError(f"contact is for analysis dynamic with integrator explicit; got {asked}")
         choose("sink", self.sink, tuple(SINKS))
         choose("gradient", self.gradient, GRADIENTS)
         choose("element", self.element, tuple(ELEMENTS))

@@ -55,6 +55,7 @@ SAMPLE, MODEL, MATERIAL, SINK, LOADING, ANALYSIS, EXPLICIT, HHT, CONTROLS = map(
     "Sample", "Model", "Material", "Sink", "Loading", "Analysis", "Explicit integrator", "HHT integrator", "Controls"))
 OUTPUT = Parameter(group=Group.create_ordered("Output"))
 MODEL_FLAG = Parameter(group=MODEL.group)
+CONTACT = Parameter(group=ANALYSIS.group, negative="", show_default=False)
 FLAG = Parameter(negative="", show_default=False)
 
 
@@ -129,6 +130,8 @@ class Options:
         "jbar" (element-constant J̄), "plain" (standard Q1, locks) or "planestress" (thin sheet with free faces, in 2D).
     kernels
         What evaluates the weak forms: "compiled" (element loops) or "forms" (scikit-fem, for small meshes).
+    contact
+        The lips of a crack bear on each other instead of passing through; of the explicit dynamic event.
     event_time
         Longest dynamic event [s], > 0.
     aftermath
@@ -207,6 +210,7 @@ class Options:
     front: Annotated[float, ANALYSIS] = StaticsControls.front
     element: Annotated[str, ANALYSIS] = Controls.element
     kernels: Annotated[str, ANALYSIS] = Controls.kernels
+    contact: Annotated[bool, CONTACT] = Controls.contact
     event_time: Annotated[float, ANALYSIS, Unit("s")] = Controls.event_time
     aftermath: Annotated[float, ANALYSIS, Unit("s")] = Controls.aftermath
     courant: Annotated[float, EXPLICIT] = ExplicitControls.courant

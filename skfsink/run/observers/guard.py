@@ -254,9 +254,8 @@ class Guard(Observer):
         first, most = self.overlaps or (found.depth, found.depth)
         self.overlaps = [first, max(most, found.depth)]
         log.warning("faces pass through each other by %.3g mm at %s, near %s mm of the undeformed body (%.2g of the "
-                    "element there): there is no contact, and what follows is a body that reaches into itself; end the "
-                    "loading before they meet, or give the notch more width", found.depth, self._when(state),
-                    place_text(found.place), found.depth / found.size)
+                    "element there), and what follows is a body that reaches into itself: %s", found.depth,
+                    self._when(state), place_text(found.place), found.depth / found.size, self._overlap_cure)
 
     def check_stress(self, state: State, crushed: np.ndarray) -> None:
         """Elements, a mask (ne,), whose stress is unknown, see :func:`.cauchy_stress`."""
@@ -270,7 +269,15 @@ class Guard(Observer):
     def check_end(self) -> None:
         """Say to what depth faces have passed through each other, if that was more than when it was first seen."""
         if self.overlaps and self.overlaps[1] > self.DEEPER * self.overlaps[0]:
-            log.warning("faces have passed through each other by up to %.3g mm: there is no contact", self.overlaps[1])
+            log.warning("faces have passed through each other by up to %.3g mm: %s", self.overlaps[1],
+                        self._overlap_cure)
+
+    @property
+    def _overlap_cure(self) -> str:
+        if self.scene.controls.contact:
+            return "contact acts between the lips of cracks alone; give a notch more width, or refine where lips meet"
+        return ("there is no contact; take --contact for the lips of cracks, end the loading before faces of a notch "
+                "meet, or give it more width")
 
     @property
     def _deletion_cure(self) -> str:

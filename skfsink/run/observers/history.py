@@ -38,7 +38,7 @@ VALUES: dict[str, Callable[[View], Any]] = {
     "time_s": lambda view: 0.0 if _timeless(view) else view.state.time,
     "grip_displacement_mm": lambda view: view.displacement,
     "reaction_N_per_mm": lambda view: view.load,
-    **{name: _energy(name) for name in ("elastic", "loads", "kinetic", "work", "sink_stored", "sink_kinetic",
+    **{name: _energy(name) for name in ("elastic", "loads", "contact", "kinetic", "work", "sink_stored", "sink_kinetic",
                                         "deletion", "numerical", "released", "balance")},
     "U_paper": _energy("paper"),
     "tip_x_mm": _tip(0), "tip_y_mm": _tip(1), "tip_z_mm": _tip(2),
