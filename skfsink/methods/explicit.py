@@ -236,7 +236,7 @@ class Explicit:
             self.momentum.contact.place(state.a)
 
     def _renew_contact(self, state: State) -> None:
-        """Book the energy that the medium has more, or less, at fixed displacement since density has fallen."""
+        """Book the energy that the medium loses at fixed displacement as density falls."""
         contact = self.momentum.contact
         if contact is None:
             return

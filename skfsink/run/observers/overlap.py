@@ -1,4 +1,4 @@
-"""Faces of a body that have passed through each other: nothing keeps them apart, since there is no contact."""
+"""Faces of a body that have passed through each other: nothing keeps them apart without contact."""
 
 from __future__ import annotations
 
