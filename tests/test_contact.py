@@ -196,7 +196,7 @@ def test_cut_plate_bears_pressure() -> None:
     """Fails if a plate with one failed row of 15 bears less than three quarters of the pressure of an intact one.
 
     It is 0.81 of it: the row closes by 7 % before it bears, which is a tenth of the way, and its lips slide. With three
-    rows it is 0.49. Seen to fail with J_c = 0.5.
+    rows it is 0.49, and nothing with J_c = 0.5.
     """
     intact = mean_load(0)
     assert intact < 0
