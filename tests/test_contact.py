@@ -14,8 +14,10 @@ from skfsink.cases.simple_shear import simple_shear
 from skfsink.errors import ParameterError
 from skfsink.fem.space import Space
 from skfsink.fields.body import Body
-from skfsink.fields.contact import Contact, _psi
+from skfsink.fields.contact import Contact
 from skfsink.fields.density import DensitySolver
+from skfsink.fields.lips import facing
+from skfsink.fields.medium import FROM, depth, psi
 from skfsink.fields.momentum import Momentum
 from skfsink.fields.state import State
 from skfsink.material import AAA, SinkLaw
@@ -59,16 +61,65 @@ def contact_force(contact: Contact, u: np.ndarray) -> np.ndarray:
     return force
 
 
-def test_law() -> None:
-    """Fails if psi_c' or psi_c'' is not the derivative of the one before, if one jumps, or if psi_c' is not monotone.
+@pytest.mark.parametrize("n", [2, 3])
+def test_law(n: int) -> None:
+    """Fails if psi' or psi'' is not the derivative of the one before, if psi or psi' jumps, or if psi' is not monotone.
 
-    Seen to fail with a cubic part of d^3/8.
+    Fails too if the modulus at first is not that of the solid, 1 + n, or `depth` is not the inverse of psi.
+    Seen to fail with psi' = left**-n - 1.
     """
     d, step = np.linspace(-0.2, 2.0, 22001), 1e-4
-    psi, force, modulus = np.array([_psi(one, 0.05) for one in d]).T
-    assert np.abs(np.diff(psi) / step + 0.5 * (force[1:] + force[:-1])).max() < 1e-6
-    assert np.abs(np.diff(force) / step + 0.5 * (modulus[1:] + modulus[:-1])).max() < 2e-3
-    assert (np.diff(force) <= 0.0).all() and (np.diff(psi) >= 0.0).all() and np.abs(np.diff(modulus)).max() < 3e-3
+    energy, force, stiffness = np.array([psi(one, n) for one in d]).T
+    smooth = (np.abs(d[1:] - 0.5 * step) > step) & (d[1:] > step)
+    assert np.abs(np.diff(energy) / step - 0.5 * (force[1:] + force[:-1])).max() < 1e-6
+    assert np.abs(np.diff(force) / step - 0.5 * (stiffness[1:] + stiffness[:-1]))[smooth].max() < 1e-3 * stiffness.max()
+    assert (np.diff(force) >= 0.0).all() and (np.diff(energy) >= 0.0).all() and np.abs(np.diff(force)).max() < 1e-2
+    assert psi(1e-9, n)[2] == pytest.approx(1 + n) and psi(FROM, n)[2] == pytest.approx(psi(2.0, n)[2])
+    assert depth(energy, n) == pytest.approx(np.maximum(d, 0.0), abs=1e-7)
+
+
+@pytest.mark.parametrize("kind", ["quad", "hex"])
+def test_medium_knows_where_lips_face(kind: str) -> None:
+    """Fails if tangents of a crack through an oblique mesh do not lie in it, or a hole has a direction of its own.
+
+    Seen to fail with the last principal direction for a tangent.
+    """
+    shape = (9, 9) if kind == "quad" else (5, 5, 5)
+    mesh = grid(kind, shape)
+    p = mesh.p.copy()
+    p[-1] += 0.5 * p[0]
+    space = Space(type(mesh)(p, mesh.t))
+    flat = space.X[space.conn].mean(axis=1) @ (np.eye(space.dim)[-1] - 0.5 * np.eye(space.dim)[0])
+    tangents, sure = facing(space, np.flatnonzero(np.abs(flat - 0.5) < 0.25))
+    normal = np.array([-0.5, *[0.0] * (space.dim - 2), 1.0])
+    assert np.abs(tangents @ normal).max() < 1e-10 and sure == pytest.approx(np.ones(sure.size), abs=1e-10)
+    assert np.einsum("mti,msi->mts", tangents, tangents) == pytest.approx(
+        np.broadcast_to(np.eye(space.dim - 1), (sure.size, space.dim - 1, space.dim - 1)), abs=1e-12)
+    hole = Space(grid(kind, shape))
+    middle = np.flatnonzero(np.abs(hole.X[hole.conn].mean(axis=1) - 0.5).max(axis=1) < 0.01)
+    assert facing(hole, middle)[1] == pytest.approx(np.zeros(1), abs=1e-12)
+    assert not facing(hole, np.arange(hole.n_elements))[1].any()
+
+
+@pytest.mark.parametrize("kind", ["quad", "hex"])
+def test_lips_slide_and_stretch_freely(kind: str) -> None:
+    """Fails if lips that slide, open, or stretch along the crack press on each other, or such that approach do not.
+
+    Seen to fail with c = 0 (lips that are drawn together by their stretch press as a fluid does when sheared short).
+    """
+    space = Space(grid(kind, (8, 8) if kind == "quad" else (4, 4, 8)))
+    momentum = Momentum(space, AAA())
+    contact = momentum.contact = Contact(space, momentum.parts, np.ones(space.X.size, bool))
+    z = space.X[:, -1] - 0.5
+    momentum.set_gamma(np.ones(space.n_nodes), np.abs(space.X[space.conn].mean(axis=1)[:, -1] - 0.5) < 0.2)
+    for stretch, gap, slide in ((1.0, 0.0, 2.0), (0.8, 0.0, 0.0), (0.8, 0.0, 1.0), (1.0, 0.5, 1.0), (0.5, 0.05, 0.0)):
+        u = np.zeros_like(space.X)
+        u[:, :-1] = (stretch - 1) * space.X[:, :-1]
+        u[:, 0] += slide * z
+        u[:, -1] = (gap + 1e-12) * z
+        assert contact.evaluate(contact.follow(u)) == 0.0
+        u[:, -1] -= 0.1 * z
+        assert (contact.evaluate(contact.follow(u)) > 0.0) == (gap < 0.1), (stretch, gap, slide)
 
 
 @pytest.mark.parametrize("kind", ["quad", "hex"])
@@ -113,12 +164,12 @@ def test_medium_pushes_nothing_as_a_whole(kind: str) -> None:
 def test_rigid_motion_presses_nothing(kind: str) -> None:
     """Fails if a body that moves and turns as a whole is pressed, or nodes that follow do not turn with it.
 
-    Seen to fail with J_c = 1.02.
+    Seen to fail with r = 1.02.
     """
     space, momentum, _ = cracked(kind)
     contact, u = momentum.contact, turned(space)
     assert contact is not None
-    assert not contact_force(contact, u).any() and contact.energy == 0.0
+    assert np.abs(contact_force(contact, u)).max() < 1e-13 and contact.energy < 1e-26
     assert np.abs(contact.follow(u) - u).max() < 1e-10
 
 
@@ -126,15 +177,15 @@ def test_rigid_motion_presses_nothing(kind: str) -> None:
 def test_elements_join_without_energy(kind: str) -> None:
     """Fails if elements that are crushed already push the lips apart as they join, or do not resist from then on.
 
-    Seen to fail with a `rest` that stays at J_c.
+    Seen to fail with a `rest` that stays at 1.
     """
     space, momentum, deleted = cracked(kind)
     contact, u = momentum.contact, pressing(space, 0.9)
     assert contact is not None
     momentum.set_gamma(np.ones(space.n_nodes), np.zeros_like(deleted))
-    assert contact.renew(contact.follow(u)) == 0.0 and (contact.rest == contact.J_C).all()
+    assert contact.renew(contact.follow(u)) == 0.0 and (contact.rest == 1.0).all()
     momentum.set_gamma(np.ones(space.n_nodes), deleted)
-    assert contact.renew(contact.follow(u)) == 0.0 and (contact.rest[deleted] < contact.J_C).any()
+    assert contact.renew(contact.follow(u)) == 0.0 and (contact.rest[deleted] < 1.0).any()
     further = contact_force(contact, pressing(space, 1.0))
     assert contact.energy > 0.0 and np.abs(further).max() > 0.0
     kept = contact.energy
@@ -260,17 +311,28 @@ def test_resumed_in_contact() -> None:
 
 @pytest.mark.slow
 def test_lips_of_the_sheared_sample(tmp_path: Path) -> None:
-    """Fails if lips of the cracks in simple shear pass through each other, or many failed elements turn inside out.
+    """Fails if lips of the cracks in simple shear pass through each other: a failed element between them turns inside out.
 
+    In frames, a few elements may, at nodes that hang on to a rest of mass; lips are nodes with 5 % and more of theirs.
     Seen to fail without `contact` (148 and more elements).
     """
     result = simple_shear(mesh="coarse", options=Options(contact=True, out=tmp_path / "run", quiet=True))
-    space = load(result.folder).scene.sample.space
-    for path in sorted((result.folder / "series").glob("run_*.vtu")):
+    scene = load(result.folder).scene
+    space, frames = scene.sample.space, sorted((result.folder / "series").glob("run_*.vtu"))
+    momentum = Momentum(space, scene.material)
+    contact = momentum.contact = Contact(space, momentum.parts, np.ones(space.X.size, bool))
+    for path in frames:
         frame = read_frame(path, 0.0, "", 2)
         assert overlap(space, frame.u, frame.gamma, frame.deleted) is None
-        J_bar = space.element_mean(np.linalg.det(np.eye(2) + space.gradient(frame.u)))[frame.deleted]
-        assert (J_bar < 0.0).sum() < 10, path.name  # of nodes with a little mass, which do not follow in the frames
+        momentum.set_gamma(frame.gamma, frame.deleted)
+        assert (_J_bar(space, contact.follow(frame.u))[frame.deleted] > 0.0).all(), path.name
+        assert (_J_bar(space, frame.u)[frame.deleted] < 0.0).sum() < 5, path.name
+    assert frame.deleted.sum() > 300
+
+
+def _J_bar(space: Space, u: np.ndarray) -> np.ndarray:
+    """J_bar of the elements (ne,) at the displacement `u` (n, dim)."""
+    return space.element_mean(np.linalg.det(np.eye(space.dim) + space.gradient(u)))
 
 
 @pytest.mark.parametrize("options", [{"analysis": "quasistatic"}, {"integrator": "hht"}])

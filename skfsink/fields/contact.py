@@ -57,6 +57,8 @@ class Contact:
         self.massless = np.zeros(space.X.shape, bool)
         self._moved = np.zeros(0, np.int64)  # numbers of those degrees of freedom
         self._bears = np.ones(space.n_nodes, bool)
+        self._weak = np.zeros(space.n_nodes, bool)
+        self._weights: Weights | None = None  # of the whole mesh, from the first failure on
         self._followers: list[Followers] = []
         self._inverse_mass = np.zeros(space.n_nodes)
         self.energy = 0.0
@@ -85,22 +87,23 @@ class Contact:
 
     def _tie(self) -> None:
         """Find the nodes of the medium that follow, and what they follow."""
-        space, self._followers = self.space, []
+        space = self.space
         near = np.zeros(space.n_nodes, bool)
         near[space.conn[self.medium]] = True
         weak = near & ~self._bears
-        if not weak.any():
+        if np.array_equal(weak, self._weak):
             return
-        weights = Weights(space, weak)
+        self._weak, self._followers = weak, []
+        if self._weights is None:
+            self._weights = Weights(space)
+        self._weights.make(weak)
         for i in range(space.dim):
-            nodes = weights.anchored(np.flatnonzero(weak & self._free[:, i]))
-            if not nodes.size:
-                continue
-            same = next((one for one in self._followers if np.array_equal(one.nodes, nodes)), None)
+            nodes = np.flatnonzero(weak & self._free[:, i])
+            same = next((one for one in self._followers if np.array_equal(one.weak, nodes)), None)
             if same is not None:
                 same.components.append(i)
-            else:
-                self._followers.append(Followers(weights, nodes, i))
+            elif nodes.size:
+                self._followers.append(Followers(self._weights.matrix, nodes, i))
 
     def follow(self, values: np.ndarray) -> np.ndarray:
         """Nodal values (n, dim) with those of the nodes that follow taken from the lips."""
@@ -151,12 +154,12 @@ class Contact:
         none.
         """
         if self.medium.size:
-            medium, law = self.medium, self._law
             d, J_bar, energy = self._pressed(placed)
-            before = self._energies[medium]
-            kept = depth(before / (law.modulus[medium] * self.space.V[medium]), law.n)
-            lowered = self.rest[medium] * (J_bar + kept) / (J_bar + d)
-            self.rest[medium] = np.where((energy > before) & (J_bar + d > 0.0), lowered, self.rest[medium])
+            more = energy > self._energies[self.medium]
+            if more.any():
+                medium, J_bar, d = self.medium[more], J_bar[more], d[more]
+                kept = depth(self._energies[medium] / (self._law.modulus[medium] * self.space.V[medium]), self._law.n)
+                self.rest[medium] *= (J_bar + kept) / (J_bar + d)
         return self.evaluate(placed)
 
     def restore(self, rest: np.ndarray, placed: np.ndarray) -> float:

@@ -43,7 +43,7 @@ def facing(space: Space, medium: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     else:  # the corners are in no order: three of them have half the face, if its sides are parallel
         normal = np.cross(normal, corners[:, 2] - corners[:, 0])
     size = np.linalg.norm(normal, axis=1)
-    tensors = (normal[:, :, None] * normal[:, None, :] / size[:, None, None]).reshape(len(lips), -1)
+    tensors = (normal[:, :, None] * normal[:, None, :] / size[:, None, None]).reshape(len(lips), dim * dim)
     nodes, at_nodes = space.conn[medium], np.zeros((space.n_nodes, dim * dim))
     for corner in mesh.facets[:, lips]:
         np.add.at(at_nodes, corner, tensors)
@@ -70,31 +70,30 @@ def _spread(values: np.ndarray, nodes: np.ndarray, at_nodes: np.ndarray) -> np.n
 
 
 class Weights:
-    """Weights of the nodes around each `weak` node (n,): its row of the Laplacian, made exact for linear functions."""
+    """Weights of the nodes around each node: its row of the Laplacian, made exact for linear functions.
 
-    def __init__(self, space: Space, weak: np.ndarray) -> None:
+    Memory: rows of nodes on the surface are changed when they are asked for.
+
+    Attributes
+    ----------
+    matrix: (n, n), row sums 0. That of a node on the surface is as said once it was among the `weak` of `make`.
+    """
+
+    def __init__(self, space: Space) -> None:
         n, na = space.n_nodes, space.conn.shape[1]
-        around = np.flatnonzero(weak[space.conn].any(axis=1))
-        local = np.einsum("eq,eqai,eqbi->eab", space.w[around], space.dN[around], space.dN[around])
-        rows = np.repeat(space.conn[around], na, axis=1).ravel()
-        columns = np.tile(space.conn[around], (1, na)).ravel()
-        matrix = csr_array(coo_array((local.ravel(), (rows, columns)), shape=(n, n)))
-        matrix.sum_duplicates()
-        for a in np.flatnonzero(weak):
-            _make_linear(matrix, int(a), space.X)
-        self.matrix = matrix
+        local = np.einsum("eq,eqai,eqbi->eab", space.w, space.dN, space.dN)
+        rows, columns = np.repeat(space.conn, na, axis=1).ravel(), np.tile(space.conn, (1, na)).ravel()
+        self.matrix = csr_array(coo_array((local.ravel(), (rows, columns)), shape=(n, n)))
+        self.matrix.sum_duplicates()
+        self._X = space.X
+        miss = np.abs(self.matrix @ space.X).max(axis=1)
+        self._bent = miss > 1e-10 * (abs(self.matrix) @ np.abs(space.X - space.X.mean(axis=0))).max(axis=1)
 
-    def anchored(self, nodes: np.ndarray) -> np.ndarray:
-        """Those of `nodes` that are joined, through others of them, to a node that is not among them."""
-        if not nodes.size:
-            return nodes
-        inner = self.matrix[nodes][:, nodes]
-        _, piece = connected_components(inner, directed=False)
-        outer = np.ones(self.matrix.shape[0], bool)
-        outer[nodes] = False
-        reaches = abs(self.matrix[nodes]) @ outer.astype(float) > 0.0
-        found: np.ndarray = nodes[np.bincount(piece, reaches)[piece] > 0]
-        return found
+    def make(self, weak: np.ndarray) -> None:
+        """Make the rows of the `weak` nodes, a mask (n,), exact for linear functions."""
+        for a in np.flatnonzero(weak & self._bent):
+            _make_linear(self.matrix, int(a), self._X)
+            self._bent[a] = False
 
 
 def _make_linear(matrix: csr_array, a: int, X: np.ndarray) -> None:
@@ -107,8 +106,6 @@ def _make_linear(matrix: csr_array, a: int, X: np.ndarray) -> None:
     columns, row = matrix.indices[here], matrix.data[here]
     others = columns != a
     arms = (X[columns[others]] - X[a]).T
-    if (np.abs(arms @ row[others]) <= 1e-10 * (np.abs(arms) @ np.abs(row[others])).max()).all():
-        return
     weights = 1.0 / np.einsum("ib,ib->b", arms, arms)
     share = np.linalg.lstsq((weights * arms) @ arms.T, arms @ weights, rcond=1e-10)[0] @ arms
     changed = weights * (1.0 - share)
@@ -127,16 +124,32 @@ class _Factors(NamedTuple):
 
 
 class Followers:
-    """Nodes that follow in some components, and the factors of their interpolation."""
+    """Nodes that follow in some components, and the factors of their interpolation.
 
-    def __init__(self, weights: Weights, nodes: np.ndarray, component: int) -> None:
-        self.nodes, self.components = nodes, [component]
-        rows = weights.matrix[nodes]
-        lu = splu(rows[:, nodes].tocsc())
+    Parameters
+    ----------
+    matrix: of :class:`Weights`.
+    weak: numbers of nodes, ascending; those that are joined, through others of them, to a node that is not among them
+        follow.
+    component: of nodal values, in which they follow; `components` may get others.
+    """
+
+    def __init__(self, matrix: csr_array, weak: np.ndarray, component: int) -> None:
+        self.weak, self.components = weak, [component]
+        rows = matrix[weak]
+        inner = np.zeros(matrix.shape[0], bool)
+        inner[weak] = True
+        _, piece = connected_components(rows[:, weak], directed=False)
+        anchors = np.add.reduceat(~inner[rows.indices], rows.indptr[:-1])
+        anchored = np.bincount(piece, anchors)[piece] > 0
+        self.nodes: np.ndarray = weak[anchored]
+        if not anchored.all():
+            rows = rows[anchored]
+        lu = splu(rows[:, self.nodes].tocsc())
         self._factors = _Factors(_columns(lu.L), _columns(lu.U), lu.perm_r, lu.perm_c)
-        rows = csr_array(rows - rows.multiply(np.isin(np.arange(rows.shape[1]), nodes)[None, :]))
-        rows.eliminate_zeros()
-        self._rows = Rows(rows.indptr, rows.indices, rows.data)
+        outer = ~inner[rows.indices]  # of nodes that do not follow
+        ends = np.concatenate([[0], np.cumsum(outer)])[rows.indptr]
+        self._rows = Rows(ends, rows.indices[outer], rows.data[outer])
 
     def interpolate(self, values: np.ndarray) -> None:
         """Set the values at the nodes that follow, of nodal values (n, components), to H values."""

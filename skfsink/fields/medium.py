@@ -28,7 +28,7 @@ from ..system.jit import njit
 __all__ = ["Law", "Strips", "depth", "missing", "psi", "push", "stiffest"]
 
 FROM = 0.4  # D
-CAP = 0.5   # M
+CAP = 2.0   # M
 
 
 class Strips(NamedTuple):
