@@ -60,7 +60,8 @@ class Contact:
         self._weak = np.zeros(space.n_nodes, bool)
         self._weights: Weights | None = None  # of the whole mesh, from the first failure on
         self._followers: list[Followers] = []
-        self._inverse_mass = np.zeros(space.n_nodes)
+        self._masses = np.ones(space.n_nodes), np.ones(space.n_nodes)  # of nodes now, and of the intact body
+        self._changed = True  # whether `update` has changed anything since `renew`
         self.energy = 0.0
 
     # --- the medium ---
@@ -69,21 +70,21 @@ class Contact:
 
         `intact` are those of the intact body.
         """
-        space = self.space
-        medium = np.flatnonzero(_forceless(gamma))
-        bears = mass >= self.BEARS * intact
-        if not (np.array_equal(medium, self.medium) and np.array_equal(bears, self._bears)):
-            self.medium, self._bears = medium, bears
-            living = np.ones(space.n_elements, bool)
+        self._masses = mass, intact
+        medium, bears = np.flatnonzero(_forceless(gamma)), mass >= self.BEARS * intact
+        grown = not np.array_equal(medium, self.medium)
+        if grown:
+            self.medium = medium
+            living = np.ones(self.space.n_elements, bool)
             living[medium] = False
-            alive = np.zeros(space.n_nodes, bool)
-            alive[space.conn[living]] = True
+            alive = np.zeros(self.space.n_nodes, bool)
+            alive[self.space.conn[living]] = True
             self.massless = ~alive[:, None] & self._free
             self._moved = np.flatnonzero(self.massless)
-            self._law.tangents[medium], self._law.sure[medium] = facing(space, medium)
+            self._law.tangents[medium], self._law.sure[medium] = facing(self.space, medium)
+        if grown or not np.array_equal(bears, self._bears):
+            self._bears, self._changed = bears, True
             self._tie()
-        inverse = np.repeat(1.0 / np.maximum(mass, self.BEARS * intact)[:, None], space.dim, axis=1)
-        self._inverse_mass = self.follow(inverse).max(axis=1)
 
     def _tie(self) -> None:
         """Find the nodes of the medium that follow, and what they follow."""
@@ -146,20 +147,22 @@ class Contact:
             one.pass_on(force)
         out += force
 
-    def renew(self, placed: np.ndarray) -> float:
-        """Energy at the displacement `placed` after an :meth:`update`, which raises that of no element.
+    def renew(self, u: np.ndarray) -> float:
+        """Energy at the displacement `u` (n, dim) after an :meth:`update`, which raises that of no element.
 
         One that would have more has joined, or has another normal, or a node that has begun to follow: its `rest` is
         lowered until it has what it had at the last evaluation. Contact thus takes energy from the body, and gives
-        none.
+        none. Nodes without mass are moved in `u`; see `place`.
         """
-        if self.medium.size:
-            d, J_bar, energy = self._pressed(placed)
-            more = energy > self._energies[self.medium]
-            if more.any():
-                medium, J_bar, d = self.medium[more], J_bar[more], d[more]
-                kept = depth(self._energies[medium] / (self._law.modulus[medium] * self.space.V[medium]), self._law.n)
-                self.rest[medium] *= (J_bar + kept) / (J_bar + d)
+        if not self._changed:
+            return self.energy
+        self._changed, placed = False, self.place(u)
+        d, J_bar, energy = self._pressed(placed)
+        more = energy > self._energies[self.medium]
+        if more.any():
+            medium, J_bar, d = self.medium[more], J_bar[more], d[more]
+            kept = depth(self._energies[medium] / (self._law.modulus[medium] * self.space.V[medium]), self._law.n)
+            self.rest[medium] *= (J_bar + kept) / (J_bar + d)
         return self.evaluate(placed)
 
     def restore(self, rest: np.ndarray, placed: np.ndarray) -> float:
@@ -185,8 +188,10 @@ class Contact:
         d, _, energy = self._pressed(placed)
         if not energy.any():
             return 0.0
+        mass, intact = self._masses
+        inverse = np.repeat(1.0 / np.maximum(mass, self.BEARS * intact)[:, None], self.space.dim, axis=1)
         return 2.0 * float(stiffest(self.space.X + placed, self._strips, self._law, self.medium, d,
-                                    self._inverse_mass))
+                                    self.follow(inverse).max(axis=1)))
 
 
 @njit(cache=True)

@@ -204,7 +204,7 @@ class Explicit:
     def update_density(self, state: State) -> None:
         """Solve for gamma from the history, book what the sink takes, delete failed elements."""
         momentum, ledger = self.momentum, state.ledger
-        self.sync(state)
+        state.W_max = momentum.backend.untile(self._W_max)
         before = Density(state.gamma, state.sink, self._zones)
         now = self.density.update(state.W_max, before, self.GAMMA_TOLERANCE)
         if now is before:
@@ -241,7 +241,7 @@ class Explicit:
         if contact is None:
             return
         self.reaction[contact.massless] = 0.0
-        before, self._pressed = self._pressed, contact.renew(contact.place(state.u))
+        before, self._pressed = self._pressed, contact.renew(state.u)
         state.ledger.deletion += before - self._pressed
         state.ledger.contact = self._pressed
 
