@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -133,23 +133,30 @@ class History:
     path: of the CSV file, written anew here.
     rows: to start with, from a checkpoint.
     dim: dimensions of the body, on which the units of forces and energies depend.
+    without: columns that the file does not have; they have a value for files of before, :attr:`Column.before`.
 
     Attributes
     ----------
     rows: a dictionary with a value for each of `HISTORY_COLUMNS` for every row.
     """
 
-    def __init__(self, path: str | Path, rows: Sequence[Mapping[str, Any]] = (), dim: int = 2) -> None:
+    def __init__(self, path: str | Path, rows: Sequence[Mapping[str, Any]] = (), dim: int = 2,
+                 without: Collection[str] = ()) -> None:
         self.path, self.dim = Path(path), dim
         self.rows = [_row(row) for row in rows]
-        write_atomic(self.path, _csv([history_header(dim), *(row.values() for row in self.rows)]))
+        self._written = [name for name in HISTORY_COLUMNS if name not in without]
+        header = [name for name, column in zip(history_header(dim), HISTORY_COLUMNS) if column in self._written]
+        write_atomic(self.path, _csv([header, *map(self._cells, self.rows)]))
+
+    def _cells(self, row: Mapping[str, Any]) -> list[Any]:
+        return [row[name] for name in self._written]
 
     def append(self, row: Mapping[str, Any]) -> None:
         """Add a row. Columns that it leaves out are as :attr:`Column.before` says, else NaN, and counts 0; an unknown
         column is a KeyError."""
         self.rows.append(_row(row))
         with reported(f"cannot write {self.path}"), open(self.path, "a", encoding="utf-8", newline="") as file:
-            file.write(_csv([self.rows[-1].values()]))
+            file.write(_csv([self._cells(self.rows[-1])]))
 
     def columns(self) -> Table:
         """The columns as arrays (rows,): `phase` of str, counts of int64, all others of float64."""

@@ -93,7 +93,8 @@ class History(Observer):
 
     def prepare(self, view: View) -> None:
         """Begin the file with the rows so far."""
-        self._table = Rows(view.folder / "history.csv", self._kept, view.body.space.dim)
+        without = () if view.body.momentum.contact else ("contact",)
+        self._table = Rows(view.folder / "history.csv", self._kept, view.body.space.dim, without)
 
     def loading(self, view: View) -> None:
         """The row of a load increment."""
