@@ -22,11 +22,14 @@ from skfsink.fields.momentum import Momentum
 from skfsink.fields.state import State
 from skfsink.material import AAA, SinkLaw
 from skfsink.methods.explicit import Explicit
+from skfsink.methods.newton import Newton
+from skfsink.methods.statics import Statics
 from skfsink.results.frame import read_frame
 from skfsink.run.observers.overlap import overlap
 from skfsink.scene.options import Options
 
 UNBREAKABLE = SinkLaw(phi=1e6)
+STIFF = AAA()
 SOFT = AAA(bulk_modulus=20.0)  # MPa: still 60 times as stiff as in shear, and fewer steps
 
 
@@ -227,31 +230,89 @@ def body_of(space: Space, free: np.ndarray, velocity: np.ndarray, deleted: np.nd
     return held_body(momentum, DensitySolver(space, UNBREAKABLE), free, velocity), state
 
 
-def mean_load(rows: int) -> float:
-    """Mean force [N/mm] on a plate of 1 mm that is pressed by 5 %, `rows` of its elements having failed."""
-    space = Space(grid("quad", (10, 15)))
-    low, high = ends(space)
+def cut(kind: str, shape: tuple[int, ...], rows: int) -> tuple[Space, np.ndarray, np.ndarray]:
+    """A body of 1 mm, its upper nodes, and `rows` of its elements at mid-height (ne,)."""
+    space = Space(grid(kind, shape))
+    middle = space.X[space.conn].mean(axis=1)[:, -1]
+    return space, ends(space, space.dim - 1)[1], np.abs(middle - 0.5) < rows / (2 * shape[-1])
+
+
+def pressed(kind: str, shape: tuple[int, ...], rows: int, by: float, material: AAA = STIFF) -> tuple[float, Newton]:
+    """Force [N; N/mm in 2D] on a body that is held at its ends and pressed by the share `by`, in statics."""
+    space, high, failed = cut(kind, shape, rows)
+    free = np.repeat(~(ends(space, space.dim - 1)[0] | high), space.dim)
+    momentum = Momentum(space, material)
+    momentum.contact = Contact(space, momentum.parts, free)
+    momentum.set_gamma(np.ones(space.n_nodes), failed)
+    newton, u = Newton(momentum, free, 1e-8, 40), np.zeros_like(space.X)
+    for _ in range(3):
+        u[:, -1] -= by / 3 * space.X[:, -1]
+        u, force = newton.equilibrium(u)
+    return float(force[high, -1].sum()), newton
+
+
+@pytest.mark.parametrize(("kind", "shape"), [("quad", (10, 15)), ("hex", (4, 4, 7))])
+@pytest.mark.parametrize("rows", [1, 3])
+def test_cut_body_bears_pressure_like_an_intact_one(kind: str, shape: tuple[int, ...], rows: int) -> None:
+    """Fails if a body that is cut through, by one or three rows of failed elements, bears another pressure by 3 %.
+
+    Fails too if Newton's method does not know the medium's tangent. Seen to fail with c = 0 (a fluid, which bears 0.90
+    and 0.70 of it in 2D), with n = 1, and (no equilibrium) with B = 0.
+    """
+    intact, _ = pressed(kind, shape, 0, 0.04)
+    force, newton = pressed(kind, shape, rows, 0.04)
+    assert intact < 0 and force == pytest.approx(intact, rel=0.03)
+    assert newton.steps < 60
+
+
+def test_explicit_bears_like_statics() -> None:
+    """Fails if a cut plate that is pressed slowly bears on average another force by 2 % than in statics.
+
+    Seen to fail with the medium's force left out of the explicit one.
+    """
+    shape, speed = (6, 9), 40.0
+    space, high, failed = cut("quad", shape, 1)
     velocity = np.zeros_like(space.X)
-    velocity[high, 1] = -20.0
-    y = space.X[space.conn].mean(axis=1)[:, 1]
-    body, state = body_of(space, np.repeat(~(low | high), 2), velocity, np.abs(y - 0.5) < rows / 30)
+    velocity[high, 1] = -speed
+    body, state = body_of(space, np.repeat(~(ends(space)[0] | high), 2), velocity, failed)
     explicit = Explicit(body)
     explicit.begin(state)
-    loads = [float(explicit.reaction[high, 1].sum()) for _ in explicit.run(state, 2.5e-3) if state.time > 2e-3]
-    assert abs(state.ledger.balance) < 1e-9 * state.ledger.elastic
-    return float(np.mean(loads))
+    loads = [float(explicit.reaction[high, 1].sum()) for _ in explicit.run(state, 1.1e-3) if state.time > 0.7e-3]
+    assert abs(state.ledger.balance) < 1e-9 * state.ledger.elastic and state.ledger.contact > 0.0
+    assert np.mean(loads) == pytest.approx(pressed("quad", shape, 1, speed * 0.9e-3, SOFT)[0], rel=0.02)
 
 
-@pytest.mark.slow
-def test_cut_plate_bears_pressure() -> None:
-    """Fails if a plate with one failed row of 15 bears less than three quarters of the pressure of an intact one.
+def test_passes_of_a_cut_plate() -> None:
+    """Fails if passes of a quasi-static analysis lose energy of the medium, or forget it at a resume.
 
-    It is 0.81 of it: the row closes by 7 % before it bears, which is a tenth of the way, and its lips slide. With three
-    rows it is 0.49, and nothing with J_c = 0.5.
+    Seen to fail with the medium's energy left out of the ledger, and with the `rest` left out of the checkpoint.
     """
-    intact = mean_load(0)
-    assert intact < 0
-    assert mean_load(1) / intact > 0.75
+    shape = (6, 9)
+    space, high, failed = cut("quad", shape, 1)
+    velocity = np.zeros_like(space.X)
+    velocity[high, 1] = -1.0
+    free = np.repeat(~(ends(space)[0] | high), 2)
+
+    def started() -> tuple[Statics, State]:
+        body, state = body_of(space, free, velocity, failed)
+        state.grip, state.u[:, 1] = 0.03, -0.03 * space.X[:, 1]
+        assert body.momentum.contact is not None
+        body.momentum.contact.rest[::2] = 0.99
+        return Statics(body), state
+
+    statics, state = started()
+    passes = statics.propagate(state)
+    for _ in range(3):
+        next(passes)
+    ledger = state.ledger
+    assert ledger.contact > 0.0 and ledger.released > 0.0 and ledger.work > 0.0
+    assert abs(ledger.balance) < 1e-3 * ledger.work
+    other, _ = started()
+    other.restore(copy.deepcopy(statics.memory()))
+    resumed = copy.deepcopy(state)
+    next(passes)
+    next(other.propagate(resumed))
+    assert resumed.ledger == state.ledger and (resumed.u == state.u).all()
 
 
 def bar(speed: float) -> tuple[Body, State]:
@@ -335,8 +396,8 @@ def _J_bar(space: Space, u: np.ndarray) -> np.ndarray:
     return space.element_mean(np.linalg.det(np.eye(space.dim) + space.gradient(u)))
 
 
-@pytest.mark.parametrize("options", [{"analysis": "quasistatic"}, {"integrator": "hht"}])
-def test_contact_is_for_explicit_events(options: dict[str, str]) -> None:
+def test_contact_is_not_for_hht() -> None:
     """Fails if an analysis that has no contact takes the option without a word. Seen to fail without the check."""
-    with pytest.raises(ParameterError, match="contact is for analysis dynamic with integrator explicit; got"):
-        Options(contact=True, **options)
+    with pytest.raises(ParameterError, match="contact is for integrator explicit and for analysis quasistatic; got"):
+        Options(contact=True, integrator="hht")
+    Options(contact=True, integrator="hht", analysis="quasistatic")

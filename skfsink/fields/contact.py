@@ -15,7 +15,7 @@ from ..fem.backend import Part
 from ..fem.space import Space
 from ..system.jit import njit
 from .lips import Followers, Weights, facing
-from .medium import Law, Strips, depth, missing, push, stiffest
+from .medium import Law, Strips, depth, missing, pulls, push, stiffest
 
 __all__ = ["Contact"]
 
@@ -175,6 +175,23 @@ class Contact:
         found = np.empty((3, self.medium.size))
         missing(self.space.X + placed, self._strips, self._law, self.medium, found)
         return found
+
+    def tangent(self, u: np.ndarray) -> np.ndarray:
+        """Matrix B (n*dim, m) of the convex part B B^T of the medium's tangent at the displacement `u` (n, dim).
+
+        A column for each element that is pressed; the other part, of its pressure, is small where that is.
+        """
+        placed = self.follow(u)
+        d = self._pressed(placed)[0]
+        pressed, d = self.medium[d > 0.0], d[d > 0.0]
+        found = np.empty((pressed.size, self.space.conn.shape[1], self.space.dim))
+        pulls(self.space.X + placed, self._strips, self._law, pressed, d, found)
+        B = np.zeros((pressed.size, *self.space.X.shape))
+        for nodes, pull, column in zip(self.space.conn[pressed], found, B):
+            column[nodes] = pull
+            for one in self._followers:
+                one.pass_on(column)
+        return B.reshape(pressed.size, -1).T
 
     def stiffest(self, u: np.ndarray) -> float:
         """Bound of the highest frequency squared that the medium adds [1/s^2] at the displacement `u` (n, dim).

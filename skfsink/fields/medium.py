@@ -25,7 +25,7 @@ import numpy as np
 from ..fem.space import Space
 from ..system.jit import njit
 
-__all__ = ["Law", "Strips", "depth", "missing", "psi", "push", "stiffest"]
+__all__ = ["Law", "Strips", "depth", "missing", "psi", "pulls", "push", "stiffest"]
 
 FROM = 0.4  # D
 CAP = 2.0   # M
@@ -214,6 +214,17 @@ def push(x, strips, law, medium, d, out):  # type: ignore[no-untyped-def]
         for n in range(pull.shape[0]):
             for i in range(dim):
                 out[strips.conn[e, n], i] += pressure * pull[n, i]
+
+
+@njit(cache=True)
+def pulls(x, strips, law, pressed, d, out):  # type: ignore[no-untyped-def]
+    """V dd/du of the elements `pressed`, times the root of mu psi''/V, into `out` (pressed, na, dim)."""
+    dim = x.shape[1]
+    work = np.empty((dim, dim)), np.empty((dim - 1, dim)), np.empty((dim - 1, dim))
+    for m in range(pressed.size):
+        e = pressed[m]
+        _pull(x, strips, law, e, work, out[m])
+        out[m] *= np.sqrt(law.modulus[e] * psi(d[m], law.n)[2] / strips.w[e].sum())
 
 
 @njit(cache=True)

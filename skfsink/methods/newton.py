@@ -95,7 +95,7 @@ class Newton:
             step, fresh = np.zeros(u.shape), False
             while True:
                 if modified:
-                    d = self.solver.apply(-r)
+                    d = self._step(u, r)
                 else:
                     d, fresh = self._direction(u, r)
                 step.reshape(-1)[self.free] = d
@@ -133,7 +133,7 @@ class Newton:
     def _direction(self, u: np.ndarray, r: np.ndarray, tolerance: float = INEXACT) -> tuple[np.ndarray, bool]:
         """A step that lowers the residual force `r` at `u`, and whether the factors behind it are those of `u`."""
         data = self.momentum.tangent(self.pattern, u)
-        if self._kept is not None and self._spent < self.WORTH[self.space.dim - 2]:
+        if self._kept is not None and not self.momentum.pressed and self._spent < self.WORTH[self.space.dim - 2]:
             most = self.MOST[self.space.dim - 2]
             d, iterations, met = self.solver.conjugate(data, -r, tolerance, most)
             self.iterations += iterations
@@ -143,7 +143,20 @@ class Newton:
             if met or iterations > most // 2:
                 return d, False
         self._factorise(u, data)
-        return self.solver.apply(-r), True
+        return self._step(u, r), True
+
+    def _step(self, u: np.ndarray, r: np.ndarray) -> np.ndarray:
+        """Solution of (K + B B^T) d = -r with the factors of K, and B of the medium between lips that press at `u`.
+
+        By the formula of Sherman, Morrison and Woodbury: B has a column for each element that is pressed.
+        """
+        d, contact = self.solver.apply(-r), self.momentum.contact
+        if contact is None or not contact.energy:
+            return d
+        B = contact.tangent(u)[self.free]
+        Z = np.stack([self.solver.apply(column) for column in B.T], axis=1)
+        small: np.ndarray = np.linalg.solve(np.eye(B.shape[1]) + B.T @ Z, B.T @ d)
+        return d - Z @ small
 
     def _factorise(self, u: np.ndarray, data: np.ndarray) -> None:
         """Factors of the tangent at `u`, or of a positive definite matrix like it."""

@@ -235,6 +235,7 @@ class StaticLoading:
             trial.drop(self.space.w, 0.5 * (W + settled.W), intact, self.momentum.gamma)
             after = self.momentum.force(settled.u)  # at the settled gamma, as after a resume
             trial.elastic, trial.loads = self.momentum.energy, self.momentum.loads
+            trial.contact = self.momentum.pressed
             opened, allowed = abs(trial.balance - ledger.balance), self.OPEN * max(trial.elastic, ledger.elastic)
             if opened > allowed and increment > self.FINE[0] * longest:
                 self.increment, self.refused = 0.5 * increment, "open"

@@ -54,6 +54,7 @@ class Statics(StaticLoading):
             self.momentum.set_gamma(state.gamma, state.deleted)
             self.momentum.force(state.u)
             ledger.elastic, ledger.loads = self.momentum.energy, self.momentum.loads
+            ledger.contact = self.momentum.pressed
             ledger.initial = self.momentum.potential
         while True:
             self.momentum.set_gamma(state.gamma, state.deleted)
@@ -87,6 +88,9 @@ class Statics(StaticLoading):
             ledger.drop(self.space.w, W, old, undeleted)
             ledger.deletion += float(np.einsum("eq,eq,eq->", self.space.w, W, undeleted - self.momentum.gamma))
             ledger.elastic = float(np.einsum("eq,eq,eq->", self.space.w, W, self.momentum.gamma))
+            if (contact := self.momentum.contact) is not None:
+                pressed, ledger.contact = contact.energy, contact.renew(state.u)
+                ledger.deletion += pressed - ledger.contact
             self.settled = change <= self.controls.gamma_tolerance and not postponed
             idle = idle + 1 if postponed and change <= self.controls.gamma_tolerance else 0
             if idle > self.IDLE:
@@ -152,9 +156,13 @@ class Statics(StaticLoading):
     # --- checkpoints ---
     def memory(self) -> dict[str, np.ndarray]:
         """What the analysis remembers beyond the state."""
-        return {"settled": np.array(self.settled), "arrested": np.array(self.arrested), **super().memory()}
+        contact = self.momentum.contact
+        return {"settled": np.array(self.settled), "arrested": np.array(self.arrested), **super().memory(),
+                **({} if contact is None else {"contact_rest": contact.rest})}
 
     def restore(self, memory: dict[str, np.ndarray]) -> None:
         """Take up what :meth:`memory` gave."""
         self.settled, self.arrested = bool(memory["settled"]), str(memory["arrested"])
+        if self.momentum.contact is not None:
+            self.momentum.contact.rest[...] = memory["contact_rest"]
         super().restore(memory)

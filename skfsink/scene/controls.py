@@ -85,9 +85,9 @@ class Controls:
         choose("start", self.start, STARTS)
         if self.start == "rest" and self.analysis != "dynamic":
             raise ParameterError(f"start rest is for analysis dynamic; got {self.analysis}")
-        if self.contact and (self.analysis, self.integrator) != ("dynamic", "explicit"):
-            asked = f"integrator {self.integrator}" if self.analysis == "dynamic" else f"analysis {self.analysis}"
-            raise ParameterError(f"contact is for analysis dynamic with integrator explicit; got {asked}")
+        if self.contact and self.integrator != "explicit" and self.analysis != "quasistatic":
+            raise ParameterError(f"contact is for integrator explicit and for analysis quasistatic; got integrator "
+                                 f"{self.integrator}")
         choose("sink", self.sink, tuple(SINKS))
         choose("gradient", self.gradient, GRADIENTS)
         choose("element", self.element, tuple(ELEMENTS))
