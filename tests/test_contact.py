@@ -21,6 +21,7 @@ from skfsink.fields.medium import FROM, depth, psi
 from skfsink.fields.momentum import Momentum
 from skfsink.fields.state import State
 from skfsink.material import AAA, SinkLaw
+from skfsink.methods.controls import ExplicitControls
 from skfsink.methods.explicit import Explicit
 from skfsink.methods.newton import Newton
 from skfsink.methods.statics import Statics
@@ -275,7 +276,7 @@ def test_explicit_bears_like_statics() -> None:
     velocity = np.zeros_like(space.X)
     velocity[high, 1] = -speed
     body, state = body_of(space, np.repeat(~(ends(space)[0] | high), 2), velocity, failed)
-    explicit = Explicit(body)
+    explicit = Explicit(body, ExplicitControls(gamma_every=100))
     explicit.begin(state)
     loads = [float(explicit.reaction[high, 1].sum()) for _ in explicit.run(state, 1.1e-3) if state.time > 0.7e-3]
     assert abs(state.ledger.balance) < 1e-9 * state.ledger.elastic and state.ledger.contact > 0.0

@@ -131,7 +131,7 @@ class Options:
     kernels
         What evaluates the weak forms: "compiled" (element loops) or "forms" (scikit-fem, for small meshes).
     contact
-        The lips of a crack bear on each other instead of passing through; of the explicit dynamic event.
+        The lips of a crack bear on each other instead of passing through; not with the integrator hht.
     event_time
         Longest dynamic event [s], > 0.
     aftermath
