@@ -95,7 +95,7 @@ class Newton:
             step, fresh = np.zeros(u.shape), False
             while True:
                 if modified:
-                    d = self._step(u, r)
+                    d = self._solve(r, self._lips(u))
                 else:
                     d, fresh = self._direction(u, r)
                 step.reshape(-1)[self.free] = d
@@ -133,7 +133,8 @@ class Newton:
     def _direction(self, u: np.ndarray, r: np.ndarray, tolerance: float = INEXACT) -> tuple[np.ndarray, bool]:
         """A step that lowers the residual force `r` at `u`, and whether the factors behind it are those of `u`."""
         data = self.momentum.tangent(self.pattern, u)
-        if self._kept is not None and not self.momentum.pressed and self._spent < self.WORTH[self.space.dim - 2]:
+        lips = self._lips(u)
+        if self._kept is not None and lips is None and self._spent < self.WORTH[self.space.dim - 2]:
             most = self.MOST[self.space.dim - 2]
             d, iterations, met = self.solver.conjugate(data, -r, tolerance, most)
             self.iterations += iterations
@@ -143,17 +144,21 @@ class Newton:
             if met or iterations > most // 2:
                 return d, False
         self._factorise(u, data)
-        return self._step(u, r), True
+        return self._solve(r, lips), True
 
-    def _step(self, u: np.ndarray, r: np.ndarray) -> np.ndarray:
-        """Solution of (K + B B^T) d = -r with the factors of K, and B of the medium between lips that press at `u`.
+    def _lips(self, u: np.ndarray) -> np.ndarray | None:
+        """B, over the free unknowns, of the tangent B B^T of lips that press on each other at `u`; None if none do."""
+        contact = self.momentum.contact
+        if contact is None or not contact.medium.size:
+            return None
+        B = contact.tangent(u)
+        return B[self.free] if B.shape[1] else None
 
-        By the formula of Sherman, Morrison and Woodbury: B has a column for each element that is pressed.
-        """
-        d, contact = self.solver.apply(-r), self.momentum.contact
-        if contact is None or not contact.energy:
+    def _solve(self, r: np.ndarray, B: np.ndarray | None) -> np.ndarray:
+        """Solution of (K + B B^T) d = -r with the factors of K, by Woodbury's formula; without B of K d = -r."""
+        d = self.solver.apply(-r)
+        if B is None:
             return d
-        B = contact.tangent(u)[self.free]
         Z = np.stack([self.solver.apply(column) for column in B.T], axis=1)
         small: np.ndarray = np.linalg.solve(np.eye(B.shape[1]) + B.T @ Z, B.T @ d)
         return d - Z @ small
