@@ -373,7 +373,7 @@ def test_resumed_in_contact() -> None:
 
 @pytest.mark.slow
 def test_lips_of_the_sheared_sample(tmp_path: Path) -> None:
-    """Fails if lips of the cracks in simple shear pass through each other: a failed element between them turns inside out.
+    """Fails if lips of cracks in simple shear pass through each other: a failed element between them is inside out.
 
     In frames, a few elements may, at nodes that hang on to a rest of mass; lips are nodes with 5 % and more of theirs.
     Seen to fail without `contact` (148 and more elements).

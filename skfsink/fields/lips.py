@@ -1,9 +1,9 @@
 """The lips of a crack: which way they face, and the nodes between them, which have next to no mass and follow them.
 
 Nodes that have lost nearly all of their mass cannot bear the force of the medium between the lips: the explicit step
-would fall. They follow the lips, u_f = H u_l, with the harmonic interpolation H of the undeformed mesh, and the medium's
-force on them goes to the lips by H^T. Rows of H sum to 1 and reproduce linear functions (at a few corners of the surface
-constants alone), so that the total force is zero and so is its moment.
+would fall. They follow the lips, u_f = H u_l, with the harmonic interpolation H of the undeformed mesh, and the
+medium's force on them goes to the lips by H^T. Rows of H sum to 1 and reproduce linear functions (at a few corners of
+the surface constants alone), so that the total force is zero and so is its moment.
 """
 
 from __future__ import annotations
@@ -34,13 +34,13 @@ def facing(space: Space, medium: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     mesh, dim = space.mesh, space.dim
     inside = np.zeros(space.n_elements, bool)
     inside[medium] = True
-    f2t = mesh.f2t
-    lips = np.flatnonzero((f2t[1] >= 0) & (inside[f2t[0]] != inside[f2t[1]]))
+    one, other = mesh.f2t
+    lips = np.flatnonzero((other >= 0) & (inside[one] != inside[other]))
     corners = space.X[mesh.facets[:, lips].T]
     normal = corners[:, 1] - corners[:, 0]
     if dim == 2:
         normal = np.stack([normal[:, 1], -normal[:, 0]], axis=1)
-    else:  # the corners are in no order: three of them have half the face, if its sides are parallel
+    else:  # the corners are in no order: any three of them span a face whose sides are parallel
         normal = np.cross(normal, corners[:, 2] - corners[:, 0])
     size = np.linalg.norm(normal, axis=1)
     tensors = (normal[:, :, None] * normal[:, None, :] / size[:, None, None]).reshape(len(lips), dim * dim)

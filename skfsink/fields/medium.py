@@ -6,9 +6,9 @@ F the mean deformation gradient. Lips that slide leave it as it is, and so do li
 
     d = r s(a) - J_bar,     s = 1 + c (cap(a) - 1),     cap = a (a < 1),  1 + (a - 1)/(1 + (a - 1)/M) beyond,
 
-of its volume; r is 1 in general (see :meth:`.Contact.renew`), c in [0, 1] says how sure N is. Where it is not, d is that
-of a fluid. An element that is sheared along a wrong N seems to have long lips: cap < 1 + M bounds that. The energy is
-V mu psi(d), that of the incompressible neo-Hookean solid pressed to the thickness 1 - d,
+of its volume; r is 1 in general (see :meth:`.Contact.renew`), c in [0, 1] says how sure N is. Where it is not, d is
+that of a fluid. An element that is sheared along a wrong N seems to have long lips: cap < 1 + M bounds that. The energy
+is V mu psi(d), that of the incompressible neo-Hookean solid pressed to the thickness 1 - d,
 
     psi' = (1 - d)^-n - (1 - d) (d < 0: 0),    n = 3 in plane strain (2D), 2 in uniaxial stress (3D),
 
@@ -76,7 +76,8 @@ def psi(d, n):  # type: ignore[no-untyped-def]
     past = max(d - FROM, 0.0)
     left = 1.0 - d + past
     power = left**-n
-    energy, force, stiffness = 0.5 * (left * left - 1.0) + (power * left - 1.0) / (n - 1), power - left, 1 + n * power / left
+    energy = 0.5 * (left * left - 1.0) + (power * left - 1.0) / (n - 1)
+    force, stiffness = power - left, 1.0 + n * power / left
     return energy + past * (force + 0.5 * stiffness * past), force + stiffness * past, stiffness
 
 
@@ -151,7 +152,7 @@ def _gradient(x, nodes, slopes, F):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def missing(x, strips, law, medium, out):  # type: ignore[no-untyped-def]
-    """d and J_bar of the elements `medium` at the positions `x` (n, dim), and their energies, into `out` (3, medium)."""
+    """d, J_bar and energy of the elements `medium` at the positions `x` (n, dim), into `out` (3, medium)."""
     dim = x.shape[1]
     F = np.empty((dim, dim))
     sides, turn = np.empty((dim - 1, dim)), np.empty((dim - 1, dim))
