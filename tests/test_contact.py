@@ -26,6 +26,7 @@ from skfsink.methods.explicit import Explicit
 from skfsink.methods.newton import Newton
 from skfsink.methods.statics import Statics
 from skfsink.results.frame import read_frame
+from skfsink.results.history import History
 from skfsink.run.observers.overlap import overlap
 from skfsink.scene.options import Options
 
@@ -390,6 +391,7 @@ def test_lips_of_the_sheared_sample(tmp_path: Path) -> None:
         assert (_J_bar(space, contact.follow(frame.u))[frame.deleted] > 0.0).all(), path.name
         assert (_J_bar(space, frame.u)[frame.deleted] < 0.0).sum() < 5, path.name
     assert frame.deleted.sum() > 300
+    assert History.load(result.folder / "history.csv")["contact"].max() > 0.0
 
 
 def _J_bar(space: Space, u: np.ndarray) -> np.ndarray:

@@ -105,6 +105,23 @@ def test_each_column_says_its_unit_and_old_files_are_read(tmp_path: Path, dim: i
     assert same_bits(History.load(history.path), loaded) and History.load(history.path).units == loaded.units
 
 
+def test_column_that_a_run_has_not(tmp_path: Path) -> None:
+    """Fails if a column that a run does not have is in its file, or is missing where the file is read.
+
+    Seen to fail with `without` left unused.
+    """
+    whole = History(tmp_path / "whole.csv", rows())
+    history = History(tmp_path / "history.csv", rows()[:1], without=["contact"])
+    for row in rows()[1:]:
+        history.append(row)
+    header, *lines = (line.split(",") for line in history.path.read_text().splitlines())
+    place = history_header(2).index("contact_N_mm_per_mm")
+    assert header == [name for i, name in enumerate(history_header(2)) if i != place]
+    assert lines == [[cell for i, cell in enumerate(line.split(",")) if i != place]
+                     for line in whole.path.read_text().splitlines()[1:]]
+    assert (History.load(history.path)["contact"] == 0.0).all()
+
+
 def test_columns_of_other_versions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if a column of one's own makes runs without it unreadable, or a run with it elsewhere."""
     history = History(tmp_path / "history.csv", rows())

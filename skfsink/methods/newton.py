@@ -109,6 +109,8 @@ class Newton:
                     self._kept = None
                 modified = False
             u += length * step
+            if momentum.contact is not None:
+                momentum.contact.place(u)
             energy = momentum.potential
         raise ConvergenceError(f"no equilibrium within {most} Newton steps")
 
