@@ -50,7 +50,7 @@ def facing(space: Space, medium: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     around = at_nodes[nodes].sum(axis=1)
     around = _spread(around, nodes, at_nodes)  # smooth along the crack
     for _ in range(ROUNDS):
-        unknown = ~around.any(axis=1)
+        unknown: np.ndarray = ~around.any(axis=1)
         if not unknown.any():
             break
         around = np.where(unknown[:, None], _spread(around, nodes, at_nodes), around)
