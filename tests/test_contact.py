@@ -298,11 +298,11 @@ def test_passes_of_a_cut_plate() -> None:
     def started() -> tuple[Statics, State]:
         body, state = body_of(space, free, velocity, failed)
         state.grip, state.u[:, 1] = 0.03, -0.03 * space.X[:, 1]
-        assert body.momentum.contact is not None
-        body.momentum.contact.rest[::2] = 0.99
         return Statics(body), state
 
     statics, state = started()
+    assert statics.momentum.contact is not None
+    statics.momentum.contact.rest[::2] = 0.99
     passes = statics.propagate(state)
     for _ in range(3):
         next(passes)

@@ -50,10 +50,10 @@ def facing(space: Space, medium: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     around = at_nodes[nodes].sum(axis=1)
     around = _spread(around, nodes, at_nodes)  # smooth along the crack
     for _ in range(ROUNDS):
-        unknown: np.ndarray = ~around.any(axis=1)
-        if not unknown.any():
+        unknown = np.flatnonzero(~around.any(axis=1))
+        if not unknown.size:
             break
-        around = np.where(unknown[:, None], _spread(around, nodes, at_nodes), around)
+        around[unknown] = _spread(around, nodes, at_nodes)[unknown]
     values, vectors = np.linalg.eigh(around.reshape(-1, dim, dim))
     sure = np.divide(values[:, -1] - values[:, -2], values[:, -1] + values[:, -2],
                      out=np.zeros(medium.size), where=values[:, -1] > 0.0)
