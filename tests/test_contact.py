@@ -399,8 +399,10 @@ def _J_bar(space: Space, u: np.ndarray) -> np.ndarray:
     return space.element_mean(np.linalg.det(np.eye(space.dim) + space.gradient(u)))
 
 
-def test_contact_is_not_for_hht() -> None:
+def test_contact_is_refused_where_there_is_none() -> None:
     """Fails if an analysis that has no contact takes the option without a word. Seen to fail without the check."""
+    with pytest.raises(ParameterError, match=r"contact is for elements jbar and plain; got planestress"):
+        Options(contact=True, element="planestress")
     with pytest.raises(ParameterError, match="contact is for integrator explicit and for analysis quasistatic; got"):
         Options(contact=True, integrator="hht")
     Options(contact=True, integrator="hht", analysis="quasistatic")

@@ -23,9 +23,9 @@ __all__ = ["Contact"]
 class Contact:
     """The medium between the lips of a crack.
 
-    Memory: the medium, its tangents, the nodes that follow and their interpolation are of the last `update`; `energy`
-    is of the last `add_force`, `evaluate`, `renew` or `restore`; `rest` is of all `renew` so far, and belongs into a
-    checkpoint.
+    Memory: the medium, its tangents, the nodes that follow and their interpolation are of the last `update`, and
+    `follow`, `place`, `stiffest` and `tangent` with them; `energy` is of the last `add_force`, `evaluate`, `renew` or
+    `restore`; `rest` is of all `renew` so far, and belongs into a checkpoint.
 
     Parameters
     ----------

@@ -72,7 +72,7 @@ def _spread(values: np.ndarray, nodes: np.ndarray, at_nodes: np.ndarray) -> np.n
 class Weights:
     """Weights of the nodes around each node: its row of the Laplacian, made exact for linear functions.
 
-    Memory: rows of nodes on the surface are changed when they are asked for.
+    Memory: `make` keeps the rows of nodes on the surface that it has made; they are the same whenever they are made.
 
     Attributes
     ----------

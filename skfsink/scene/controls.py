@@ -88,6 +88,9 @@ class Controls:
         if self.contact and self.integrator != "explicit" and self.analysis != "quasistatic":
             raise ParameterError(f"contact is for integrator explicit and for analysis quasistatic; got integrator "
                                  f"{self.integrator}")
+        if self.contact and self.element == "planestress":
+            raise ParameterError("contact is for elements jbar and plain; got planestress: the lips of a thin sheet "
+                                 "buckle out of it")
         choose("sink", self.sink, tuple(SINKS))
         choose("gradient", self.gradient, GRADIENTS)
         choose("element", self.element, tuple(ELEMENTS))
