@@ -112,14 +112,15 @@ def thinned(moments: Sequence[Moment], every: int) -> list[Moment]:
 def check_sink(body: Body, ledger: Ledger, moments: Sequence[Moment], every: int = 1, within: float = 0.01) -> None:
     """Hold D of a ledger, in both parts, against each `every`-th moment of an event.
 
-    Half as many tell the error of these, which is to be below `within` of the initial energy.
+    Half as many tell the error of these, which is to be below `within` of the initial energy; 3e-3 of that is allowed
+    beside it.
     """
     energies, initial = Energies(body), ledger.initial
     fine, coarse = (energies.taken(thinned(moments, steps)) for steps in (every, 2 * every))
     for booked, near, far in zip((ledger.sink_stored, ledger.sink_kinetic), fine, coarse, strict=True):
         assert near > 0.02 * initial
         assert abs(near - far) < within * initial
-        assert booked == pytest.approx(near, abs=1.5 * abs(near - far) + 1e-3 * initial)
+        assert booked == pytest.approx(near, abs=1.5 * abs(near - far) + 3e-3 * initial)
 
 
 def _mean(m0: np.ndarray, q0: np.ndarray, m1: np.ndarray, q1: np.ndarray) -> np.ndarray:

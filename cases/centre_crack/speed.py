@@ -43,20 +43,29 @@ def figures(run: Run) -> dict[str, float]:
     front = np.fmax.accumulate(np.abs(np.nan_to_num(rows["tip_x_mm"])))
     start, end = X[scene.sample.nodes("crack"), 0].max(), X[:, 0].max()
     fitted = (front > start + 0.25 * (end - start)) & (front < start + 0.75 * (end - start))
+    speed = np.nan  # of a front that comes less far along the strip
+    if fitted.any() and np.ptp(front[fitted]) > 0.1 * (end - start):
+        speed = float(np.polyfit(rows["time_s"][fitted], front[fitted], 1)[0]) * 1e-3
     along, across = stretches(run)
     transverse, longitudinal = waves(scene.material, along, across)
-    return {"along": along, "across": across,
-            "speed": float(np.polyfit(rows["time_s"][fitted], front[fitted], 1)[0]) * 1e-3,
+    return {"along": along, "across": across, "speed": speed,
             "c_s": scene.material.shear_wave_speed, "c_R": scene.material.rayleigh_wave_speed,
             "transverse": transverse, "longitudinal": longitudinal, "branches": run.summary["event"]["max_branches"],
             "numerical": run.summary["energy"]["numerical"] / run.summary["energy"]["initial"]}
 
 
+HEADER = "phi MPa  stretched along, across  front m/s  of c_s  of c_R  of transverse, longitudinal  tips  numerical"
+
+
+def line(run: Run, f: dict[str, float]) -> str:
+    """The figures of a run under `HEADER`."""
+    return (f"{run.scene.sink_law.phi:7.3g} {f['along']:15.3f} {f['across']:7.3f} {f['speed']:10.2f} "
+            f"{f['speed'] / f['c_s']:7.3f} {f['speed'] / f['c_R']:7.3f} {f['speed'] / f['transverse']:14.3f} "
+            f"{f['speed'] / f['longitudinal']:12.3f} {f['branches']:5.0f} {f['numerical']:10.2%}")
+
+
 if __name__ == "__main__":
-    print("phi MPa  stretched along, across  front m/s  of c_s  of c_R  of transverse, longitudinal  tips  numerical")
+    print(HEADER)
     for folder in sys.argv[1:]:
-        run = skfsink.load(Path(folder))
-        f = figures(run)
-        print(f"{run.scene.sink_law.phi:7.3g} {f['along']:15.3f} {f['across']:7.3f} {f['speed']:10.2f} "
-              f"{f['speed'] / f['c_s']:7.3f} {f['speed'] / f['c_R']:7.3f} {f['speed'] / f['transverse']:14.3f} "
-              f"{f['speed'] / f['longitudinal']:12.3f} {f['branches']:5.0f} {f['numerical']:10.2%}")
+        found = skfsink.load(Path(folder))
+        print(line(found, figures(found)))
