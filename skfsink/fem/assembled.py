@@ -26,9 +26,9 @@ from skfem.assembly.form.form import FormExtraParams
 from ..errors import ParameterError
 from ..material import Material
 from . import kernels
-from .backend import Part
+from .backend import BulkViscosity, Part
 from .elements import ELEMENTS
-from .forms import MomentumForms, density_forms, row_sums
+from .forms import MomentumForms, ViscousForms, density_forms, row_sums, viscous_forms
 from .pattern import Pattern
 from .space import Space
 
@@ -85,9 +85,11 @@ class AssembledMomentum:
     Memory: see :class:`.MomentumBackend`.
     """
 
-    def __init__(self, space: Space, parts: Sequence[Part], element: str, *, threads: int = 1) -> None:
-        self._space, self._element, self._parts = space, element, parts
+    def __init__(self, space: Space, parts: Sequence[Part], element: str, *, threads: int = 1,
+                 bulk_viscosity: BulkViscosity = BulkViscosity()) -> None:  # noqa: B008
+        self._space, self._element, self._parts, self._bulk_viscosity = space, element, parts, bulk_viscosity
         self._forms = [self.forms(part.material) for part in parts]
+        self._viscous = [self.viscous_forms(part.material) for part in parts]
         self._assemblies = [_Assembly(space, space.u_basis, part.elements) for part in parts]
         self._scalar = _Assembly(space, space.gamma_basis, None)
         self.gamma, self.W = np.zeros_like(space.w), np.zeros_like(space.w)
@@ -96,6 +98,10 @@ class AssembledMomentum:
     def forms(self, material: Material) -> MomentumForms:
         """The forms of a material; a form that is to be tried takes the place of one of them."""
         return ELEMENTS[self._element].forms(material)
+
+    def viscous_forms(self, material: Material) -> ViscousForms:
+        """Those of its viscosity."""
+        return viscous_forms(material, self._bulk_viscosity, ELEMENTS[self._element].thin_sheet)
 
     def _fields(self, number: int, u: np.ndarray, gamma: np.ndarray) -> dict[str, Any]:
         """What the forms of a part are functions of, at the displacement `u` (n, dim) and density (ne, nq)."""
@@ -195,6 +201,30 @@ class AssembledMomentum:
         value = sum(np.asarray(field) * local[:, i, None] for i, field in enumerate(functions))
         gradient = sum(field.grad * local[:, i, None] for i, field in enumerate(functions))
         return DiscreteField(value, gradient)
+
+    def viscous_force(self, u: np.ndarray, v: np.ndarray, out: np.ndarray) -> float:
+        """Viscous force; see :class:`.MomentumBackend`."""
+        total, greatest = np.zeros(u.size), 0.0
+        for number, (forms, assembly) in enumerate(zip(self._viscous, self._assemblies)):
+            fields = {**self._fields(number, u, self.gamma), "velocity": assembly.basis.interpolate(v.ravel())}
+            vectors = assembly.vectors(forms.force, **fields)
+            total += np.bincount(assembly.dofs.ravel(), vectors.ravel(), u.size)
+            if any(self._bulk_viscosity):
+                live = fields["gamma"].any(axis=1)
+                compression = np.asarray(forms.compression.form(_extra(fields)))
+                greatest = max(greatest, float(compression[live].max(initial=0.0)))
+        out[...] = total.reshape(u.shape)
+        return greatest
+
+    def viscous_tangent(self, pattern: Pattern, motion: tuple[np.ndarray, np.ndarray], gamma: np.ndarray,
+                        compression: float) -> np.ndarray:
+        """Data of its derivative with the velocity; see :class:`.MomentumBackend`."""
+        u, v = motion
+        data = np.zeros(pattern.nnz)
+        for number, (forms, assembly) in enumerate(zip(self._viscous, self._assemblies)):
+            assembly.add_matrix(forms.tangent, pattern, data, **self._fields(number, u, gamma),
+                                velocity=assembly.basis.interpolate(v.ravel()), compression=compression)
+        return data
 
 
 def _extra(fields: dict[str, Any]) -> FormExtraParams:

@@ -8,10 +8,11 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from ..material import Material
+from .forms import BulkViscosity
 from .pattern import Pattern
 from .space import Space
 
-__all__ = ["Backend", "DensityBackend", "MomentumBackend", "Part"]
+__all__ = ["Backend", "BulkViscosity", "DensityBackend", "MomentumBackend", "Part"]
 
 
 class Part(NamedTuple):
@@ -82,6 +83,20 @@ class MomentumBackend(Protocol):
     def stiffest(self, u: np.ndarray, inverse_mass: np.ndarray) -> float:
         """Cheap lower bound of the highest frequency squared [1/s^2]; see :meth:`.Momentum.stiffest`."""
 
+    def viscous_force(self, u: np.ndarray, v: np.ndarray, out: np.ndarray) -> float:
+        """Viscous force at displacement `u` and velocity `v` (n, dim) [mm; mm/s] into `out` (n, dim) [N; N/mm in 2D].
+
+        Returns the greatest compression -L/c_d min(0, D) of an element with gamma > 0, 0 without bulk viscosity. What
+        `force` has left is not touched.
+        """
+
+    def viscous_tangent(self, pattern: Pattern, motion: tuple[np.ndarray, np.ndarray], gamma: np.ndarray,
+                        compression: float) -> np.ndarray:
+        """Data of the derivative of that force with the velocity on `pattern`; see :meth:`.Momentum.viscous_tangent`.
+
+        `motion` are displacement and velocity.
+        """
+
 
 class DensityBackend(Protocol):
     """Evaluates the matrices of the mass balance (Eq. 21, 24) on one mesh."""
@@ -100,7 +115,8 @@ class DensityBackend(Protocol):
 
 
 class _MakesMomentum(Protocol):
-    def __call__(self, space: Space, parts: Sequence[Part], element: str, *, threads: int = 1) -> MomentumBackend: ...
+    def __call__(self, space: Space, parts: Sequence[Part], element: str, *, threads: int = 1,
+                 bulk_viscosity: BulkViscosity = ...) -> MomentumBackend: ...
 
 
 class _MakesDensity(Protocol):

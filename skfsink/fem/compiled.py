@@ -8,7 +8,7 @@ import numpy as np
 
 from ..material import GeneralMaterial
 from . import kernels
-from .backend import Part
+from .backend import BulkViscosity, Part
 from .elements import ELEMENTS
 from .pattern import Pattern
 from .space import Space
@@ -22,13 +22,18 @@ class CompiledMomentum:
     Memory: see :class:`.MomentumBackend`.
     """
 
-    def __init__(self, space: Space, parts: Sequence[Part], element: str, *, threads: int = 1) -> None:
+    def __init__(self, space: Space, parts: Sequence[Part], element: str, *, threads: int = 1,
+                 bulk_viscosity: BulkViscosity = BulkViscosity()) -> None:  # noqa: B008
         self._space, self._parts = space, parts
         self._plane_stress, self._j_bar = ELEMENTS[element].thin_sheet, ELEMENTS[element].j_bar
         self.tiles = kernels.Tiles(space, self._plane_stress, threads,
                                    [(part.elements, part.fibres) for part in parts])
         materials = [part.material for part in parts]
         self._laws = [kernels.Law(m.compiled_law, m.constants, m.bulk_modulus) for m in materials]
+        speeds = [m.dilatational_wave_speed * 1e3 for m in materials]
+        bulk = [float(b) for b in bulk_viscosity]
+        self._viscous = [kernels.Viscous(m.viscosity, self._plane_stress, c_d, m.rho0 * c_d, *bulk)
+                         for m, c_d in zip(materials, speeds)]
         self.gamma, self.W = self.tiles.gamma, self.tiles.W
         self.tile, self.untile, self.set_gamma = self.tiles.tile, self.tiles.untile, self.tiles.set_gamma
         self.relax, self.mean_force = self.tiles.relax, self.tiles.mean_force
@@ -72,6 +77,19 @@ class CompiledMomentum:
         if self._plane_stress:
             return self.tiles.plane_stiffness(x, self._laws, inverse_mass)
         return self.tiles.volumetric(x, [law.bulk_modulus for law in self._laws], inverse_mass)
+
+    def viscous_force(self, u: np.ndarray, v: np.ndarray, out: np.ndarray) -> float:
+        """Viscous force; see :class:`.MomentumBackend`."""
+        return self.tiles.viscous_force(self._space.X + u, v, self._viscous, out)
+
+    def viscous_tangent(self, pattern: Pattern, motion: tuple[np.ndarray, np.ndarray], gamma: np.ndarray,
+                        compression: float) -> np.ndarray:
+        """Data of its derivative with the velocity; see :class:`.MomentumBackend`."""
+        data = np.zeros(pattern.nnz)
+        for law, part in zip(self._viscous, self._parts):
+            data += kernels.viscous_tangent(self._space, pattern, law, motion, gamma, compression=compression,
+                                            elements=part.elements)
+        return data
 
 
 def _density(space: Space, parts: Sequence[Part]) -> float | np.ndarray:

@@ -17,7 +17,7 @@ from ..material.homogeneous import wave_speed_at_failure
 from ..material.regions import Region
 from .contact import Contact
 from .density import DensitySolver
-from .momentum import Momentum
+from .momentum import BulkViscosity, Momentum
 from .state import State
 
 __all__ = ["Body", "BodyControls", "BodyScene"]
@@ -57,6 +57,14 @@ class BodyControls(Protocol):
     @property
     def contact(self) -> bool:
         """Whether the lips of cracks bear on each other."""
+
+    @property
+    def bulk_viscosity_linear(self) -> float:
+        """Coefficient b1 of the bulk viscosity."""
+
+    @property
+    def bulk_viscosity_quadratic(self) -> float:
+        """Coefficient b2 of the bulk viscosity."""
 
     def workers(self, dim: int) -> int:
         """Threads for a body of that dimension."""
@@ -124,7 +132,9 @@ class Body:
         controls, space, loading = scene.controls, scene.space, scene.loading()
         threads = controls.workers(space.dim)
         momentum = Momentum(space, scene.material, controls.element, controls.force_floor, threads,
-                            regions=scene.regions, dead=loading.dead, kernels=controls.kernels)
+                            regions=scene.regions, dead=loading.dead, kernels=controls.kernels,
+                            bulk_viscosity=BulkViscosity(controls.bulk_viscosity_linear,
+                                                         controls.bulk_viscosity_quadratic))
         if controls.contact:
             momentum.contact = Contact(space, momentum.parts, loading.free)
         density = DensitySolver(space, scene.sink_law, controls.sink, active_zone=controls.active_zone,

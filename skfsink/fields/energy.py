@@ -8,7 +8,7 @@ mass that disappears:
 The ledger keeps D in its two parts beside the energy of the paper, U = sum over failed elements of A_i psi_f
 (Eq. 30, 32), which is a measure of the failed area and does not enter the balance:
 
-    elastic + loads + contact + kinetic + D + deletion + numerical + released = initial + external work.
+    elastic + loads + contact + kinetic + D + deletion + numerical + released + viscous = initial + external work.
 
 Every entry is computed from its own definition; none is what is left over from the others.
 """
@@ -42,6 +42,7 @@ class Ledger:
         falls.
     numerical: dissipation of the scheme, from its own identity (negative: it fed energy in).
     released: energy a quasi-static analysis gives up in relaxing at fixed gamma; a dynamic one turns it into motion.
+    viscous: work done against viscosity, never negative but for terms of second order in the step.
     paper: U of the paper.
     """
 
@@ -55,6 +56,7 @@ class Ledger:
     deletion: float = 0.0
     numerical: float = 0.0
     released: float = 0.0
+    viscous: float = 0.0
     paper: float = 0.0
     contact: float = 0.0
 
@@ -67,7 +69,7 @@ class Ledger:
     def balance(self) -> float:
         """What does not close: left side minus right side of the balance."""
         return (self.elastic + self.loads + self.kinetic + self.sink + self.deletion + self.numerical + self.released
-                - self.initial - self.work + self.contact)
+                - self.initial - self.work + self.contact + self.viscous)
 
     @property
     def turnover(self) -> float:

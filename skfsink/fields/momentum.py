@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..errors import ParameterError
-from ..fem.backend import Part
+from ..fem.backend import BulkViscosity, Part
 from ..fem.backends import backend
 from ..fem.elements import check_element
 from ..fem.pattern import Pattern
@@ -17,15 +17,15 @@ from ..material import GeneralMaterial, Material
 from ..material.regions import Region, by_element, rest_of
 from .contact import Contact
 
-__all__ = ["Momentum", "Part"]
+__all__ = ["BulkViscosity", "Momentum", "Part"]
 
 
 class Momentum:
     """Internal force and its derivatives (Eq. 14-19, 28) for the relative density last given.
 
     Memory: the density last given to `set_gamma` and the load time last given to `set_time`: `force`, `tangent`,
-    `stiffest`, `lumped_mass` and `consistent_mass` are for these. `potential`, `W`, `energy` and `pressed` are of the
-    last `force`. `contact` is set once.
+    `stiffest`, `viscous_force`, `lumped_mass` and `consistent_mass` are for these. `potential`, `W`, `energy` and
+    `pressed` are of the last `force`, `compression` of the last `viscous_force`. `contact` is set once.
 
     Parameters
     ----------
@@ -37,6 +37,7 @@ class Momentum:
     regions: elements of other materials.
     kernels: what evaluates the weak forms, a name in :data:`.BACKENDS`.
     dead: dead loads, if there are any, at the load time last given to :meth:`set_time`; `force` is less them.
+    bulk_viscosity: coefficients of the bulk viscosity; the shear viscosity is that of the materials.
 
     Attributes
     ----------
@@ -49,16 +50,22 @@ class Momentum:
     loads: potential -f.u of the dead loads at the last evaluation, in the same units.
     least_J: least J (plane stress: its part in the plane) at a Gauss point with gamma > 0 at the last evaluation.
     evaluations: how often the force was evaluated.
+    is_viscous: whether there is any viscosity, so that `viscous_force` is not zero.
+    compression: greatest -L/c_d min(0, D) of an element, with which the bulk viscosity grows.
     """
 
     def __init__(self, space: Space, material: Material, element: str = "jbar", force_floor: float = 1e-3,
                  threads: int = 1, *, regions: Sequence[Region] = (), dead: NodalLoads | None = None,
-                 kernels: str = "compiled") -> None:
+                 kernels: str = "compiled", bulk_viscosity: BulkViscosity = BulkViscosity()) -> None:  # noqa: B008
         self.plane_stress = check_element(element, space, kernels).thin_sheet
         self.space, self.material, self.element, self.force_floor = space, material, element, force_floor
         self.parts = self._divide(regions)
         materials = [part.material for part in self.parts]
-        self.backend = backend(kernels).momentum(space, self.parts, element, threads=threads)
+        self.backend = backend(kernels).momentum(space, self.parts, element, threads=threads,
+                                                  bulk_viscosity=bulk_viscosity)
+        self.bulk_viscosity = bulk_viscosity
+        self.is_viscous = any(bulk_viscosity) or any(m.viscosity > 0.0 for m in materials)
+        self.compression = 0.0
         moduli, speeds = [m.shear_modulus for m in materials], [m.shear_wave_speed for m in materials]
         self.shear_moduli, self.shear_wave_speeds = (min(moduli), max(moduli)), (min(speeds), max(speeds))
         rho0 = by_element(space.n_elements, material.rho0, regions, lambda region: region.material.rho0)
@@ -153,6 +160,22 @@ class Momentum:
             self.contact.add_force(placed, out)
         self.evaluations += 1
         return out
+
+    def viscous_force(self, u: np.ndarray, v: np.ndarray, out: np.ndarray | None = None) -> np.ndarray:
+        """Force of the viscosity at displacement `u` and velocity `v` (n, dim) [mm; mm/s], (n, dim) [N; N/mm in 2D].
+
+        Its power with `v` is never negative. Sets `compression`.
+        """
+        out = np.empty_like(self.space.X) if out is None else out
+        self.compression = self.backend.viscous_force(u, v, out)
+        return out
+
+    def viscous_tangent(self, pattern: Pattern, u: np.ndarray, v: np.ndarray, compression: float = 0.0) -> np.ndarray:
+        """Data of the derivative of that force with `v` on `pattern`, symmetric and nowhere negative [N s/mm].
+
+        Elements count as compressed by `compression` at least.
+        """
+        return self.backend.viscous_tangent(pattern, (u, v), self.gamma, compression)
 
     @property
     def W(self) -> np.ndarray:

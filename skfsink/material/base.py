@@ -10,7 +10,7 @@ with `J` replaced by its element mean in the volumetric part (Eq. 12, 13; see :m
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -33,16 +33,19 @@ class Material:
     ----------
     bulk_modulus: Bulk modulus k [MPa], > 0.
     density: Mass density of the intact solid, rho0 [kg/m^3], > 0.
+    viscosity: Shear viscosity eta [MPa s], >= 0: a Newtonian stress 2 eta dev d beside the elastic one, where it moves.
     """
 
     law: ClassVar[Callable[..., None]]
 
     bulk_modulus: float = 500.0
     density: float = 1433.0
+    viscosity: float = field(default=0.0, kw_only=True)
 
     def __post_init__(self) -> None:
         require("bulk_modulus", self.bulk_modulus, "MPa", low=0, low_open=True)
         require("density", self.density, "kg/m^3", low=0, low_open=True)
+        require("viscosity", self.viscosity, "MPa s", low=0)
 
     @property
     def constants(self) -> np.ndarray:

@@ -18,7 +18,7 @@ from .library import MATERIALS, material_from
 __all__ = ["MODULI", "constant_names", "constant_unit", "constants_text", "material_of", "own_constants",
            "read_constants"]
 
-COMMON = tuple(field.name for field in fields(Material))  # bulk_modulus and density have parameters of their own
+COMMON = tuple(field.name for field in fields(Material))  # these have parameters of their own
 _MPA, _PURE = ("mu", "c", "c1", "c2", "c3", "k1", "E", "G"), ("limit", "segments", "k2", "kappa", "nu")
 MODULI = ("E", "G", "nu")
 #: the constant that the shear modulus of the undeformed material determines, and how; the rest are the other constants
@@ -127,8 +127,8 @@ def constants_text(material: Material) -> str:
                                      f"{value!r} {constant_unit(name)}".strip()) for name, value in values)
 
 
-def material_of(law: str, constants: str, bulk_modulus: float, density: float) -> Material:
-    """The material of a law's name, its constants as text, k [MPa] unless these have nu, and rho0 [kg/m^3].
+def material_of(law: str, constants: str, bulk_modulus: float, density: float, viscosity: float = 0.0) -> Material:
+    """The material of a law's name, its constants as text, k [MPa] unless these have nu, rho0 [kg/m^3], eta [MPa s].
 
     Raises
     ------
@@ -137,4 +137,5 @@ def material_of(law: str, constants: str, bulk_modulus: float, density: float) -
     """
     if law not in MATERIALS:
         raise ParameterError(f"material must be one of {', '.join(MATERIALS)}; got {law!r}")
-    return material_from(law, {"bulk_modulus": bulk_modulus, "density": density, **read_constants(law, constants)})
+    return material_from(law, {"bulk_modulus": bulk_modulus, "density": density, "viscosity": viscosity,
+                               **read_constants(law, constants)})

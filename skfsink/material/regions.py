@@ -105,6 +105,7 @@ class RegionLaw:
     m: sharpness of the limiter, >= 1; 0 takes that of the body.
     bulk_modulus: bulk modulus k [MPa], > 0; 0 takes that of the body.
     density: density rho0 [kg/m^3], > 0; 0 takes that of the body.
+    viscosity: shear viscosity eta [MPa s], > 0; 0 takes that of the body.
     """
 
     name: str
@@ -114,6 +115,7 @@ class RegionLaw:
     m: float = 0.0
     bulk_modulus: Annotated[float, Unit("MPa")] = 0.0
     density: Annotated[float, Unit("kg/m^3")] = 0.0
+    viscosity: Annotated[float, Unit("MPa s")] = 0.0
 
     def laws(self, material: Material, sink_law: SinkLaw) -> tuple[Material, SinkLaw]:
         """Material and sink law of the region, in a body of these."""
@@ -121,7 +123,7 @@ class RegionLaw:
             if self.bulk_modulus:
                 one_bulk_modulus(own_constants(self.material, self.constants)[1], self.bulk_modulus)
             law = material_of(self.material, self.constants, self.bulk_modulus or material.bulk_modulus,
-                              self.density or material.density)
+                              self.density or material.density, self.viscosity or material.viscosity)
             phi = self.phi or limiter_of(self.material).phi
             return law, SinkLaw(phi, self.m or sink_law.m, sink_law.length_scale, sink_law.epsilon)
         except ParameterError as error:

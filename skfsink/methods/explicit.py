@@ -4,7 +4,8 @@ Velocity form of the scheme, for the free degrees of freedom:
 
     u_{n+1} = u_n + dt (v_n + dt/2 a_n),   m a_{n+1} = -f(u_{n+1}),   v_{n+1} = v_n + dt/2 (a_n + a_{n+1}),
 
-with f the internal force less the dead loads.
+with f the internal force less the dead loads, and with viscosity the viscous force at u_{n+1} and at the mean velocity
+of the step that led there.
 
 gamma multiplies stiffness and mass alike, so damage does not lower the stable step. Every few steps gamma is
 solved anew; accelerations are kept when the mass changes with it.
@@ -14,7 +15,9 @@ With V the mean velocity of a step and f_n = -m a_n, the scheme obeys, exactly,
     K_{n+1} - K_n = - (f_n + f_{n+1})/2 . (u_{n+1} - u_n) + dt^2/8 (f_{n+1}.m^-1 f_{n+1} - f_n.m^-1 f_n),
 
 so the dissipation it adds is the difference between that trapezoidal work (with that of the dead loads taken back) and
-the change of stored energy at fixed gamma, less the last term: that is what the ledger books as numerical.
+the change of stored energy at fixed gamma, less the last term: that is what the ledger books as numerical. With
+viscosity f is the sum of both forces; what in the work and the last term is not of internal forces alone is booked as
+viscous.
 """
 
 from __future__ import annotations
@@ -29,8 +32,8 @@ from ..fields.body import Body
 from ..fields.deletion import delete_failed, left_in
 from ..fields.density import Density
 from ..fields.state import State
-from ..system.jit import njit
 from .controls import EventControls, ExplicitControls
+from .nodal_steps import half_square, kick, move
 from .step_length import StepLength
 
 __all__ = ["Explicit"]
@@ -51,14 +54,14 @@ class Explicit:
     Attributes
     ----------
     dt: the current step [s].   estimates: frequency estimates made.   factorisations: none.
-    reaction: (n, dim) internal force less the dead loads.
+    reaction: (n, dim) internal and viscous force less the dead loads.
     """
 
     GAMMA_INTERVAL = 0.03  # l/c_s between solves for gamma; the crack then runs less than 3 % of l
     STIFFENING = 4 / 3  # waves at failure faster than this times c_s, as in the tissue, make them more frequent
     GAMMA_MOST = 10  # steps between them at the most, lest a failing element that shortens the step keeps failing
     GAMMA_TOLERANCE = 1e-6  # relative residual of a solve for gamma
-    _REMEMBERED = ("_elastic", "_since_gamma")
+    _REMEMBERED = ("_elastic", "_since_gamma", "_compression")
 
     factorisations = 0
 
@@ -72,6 +75,8 @@ class Explicit:
         self.length = StepLength(self.momentum, self.free, self.controls, self._interval)
         self._stiffening = max(1.0, body.wave_speed_at_failure / self.momentum.shear_wave_speeds[1] / self.STIFFENING)
         self._since_gamma = 0
+        self._viscous: np.ndarray | None = None  # viscous force in `reaction`
+        self._compression = 0.0
         self._zones: tuple[Zone, ...] = ()
 
     @classmethod
@@ -89,6 +94,11 @@ class Explicit:
         self._W = self.momentum.backend.W
         self._W_max = self.momentum.backend.tile(state.W_max)
         self._elastic, self._pressed = self.momentum.energy, self.momentum.pressed
+        self._compression, self._viscous = 0.0, None
+        if self.momentum.is_viscous:
+            self._viscous = self.momentum.viscous_force(state.u, state.v)
+            self._compression, self._spare_viscous = self.momentum.compression, np.empty_like(self.reaction)
+            self.reaction += self._viscous
         self._spare, self._du = np.empty_like(self.reaction), np.empty_like(self.reaction)
         self._next = np.empty_like(state.u), np.empty_like(state.u), np.empty_like(state.u)
 
@@ -101,8 +111,8 @@ class Explicit:
 
     def begin(self, state: State) -> None:
         """Set the body in motion: accelerations from the forces, energies of the start."""
+        np.copyto(state.v, self.loading.velocity(state.grip), where=~self._free)
         self.start(state)
-        np.copyto(state.v, self._grip_velocity, where=~self._free)
         np.divide(-self.reaction, self.mass[:, None], out=state.a, where=self._inverse > 0.0)
         state.a[self._inverse == 0.0] = 0.0
         state.ledger.initial = state.ledger.elastic = self._elastic
@@ -111,7 +121,7 @@ class Explicit:
         state.ledger.initial += state.ledger.kinetic + state.ledger.loads + self._pressed
 
     def _kinetic(self, state: State) -> float:
-        return float(self.mass @ _half_square(state.v))
+        return float(self.mass @ half_square(state.v))
 
     # --- the step ---
     def run(self, state: State, t_end: float) -> Iterator[State]:
@@ -128,7 +138,7 @@ class Explicit:
         InstabilityError
             No step, however short, keeps the energy.
         """
-        self.length.look(state.step, state.u, self.mass, self._inverse)
+        self.length.look(state.step, state.u, self.mass, self._inverse, self._compression)
         while not self._try(state):
             if self.length.is_given_up:
                 self._give_up(state)
@@ -147,9 +157,13 @@ class Explicit:
         old, before = self.reaction, None if dead is None else dead.values
         self.momentum.set_time(grip)
         (u, v, a), du = self._next, self._du
-        _move((state.u, state.v, state.a), self._moving, self._grip_velocity, dt, (u, v, du))
+        move((state.u, state.v, state.a), self._moving, self._grip_velocity, dt, (u, v, du))
         force = self.momentum.force(u, self._spare)
-        trapezoid, held, kinetic, swing = _kick((v, state.a, a), self._inverse, self.mass, (old, force), du, dt)
+        viscous = self._viscous
+        if viscous is not None:
+            new_viscous = self.momentum.viscous_force(u, v, self._spare_viscous)
+            force += new_viscous
+        trapezoid, held, kinetic, swing = kick((v, state.a, a), self._inverse, self.mass, (old, force), du, dt)
         ledger = state.ledger
         elastic, pressed = self.momentum.energy, self.momentum.pressed
         energy_fed_in = dt * dt / 8 * swing + (elastic - self._elastic) + (pressed - self._pressed) - trapezoid
@@ -157,6 +171,9 @@ class Explicit:
             energy_fed_in -= dead.effort(before, du)
         present, initial = elastic + pressed + kinetic, ledger.initial
         energy = max(abs(initial), present, self.body.least_energy)
+        if viscous is not None:
+            viscous_work = self._viscous_work((viscous, new_viscous), (-self.mass[:, None] * state.a, force), du, dt)
+            energy_fed_in += viscous_work
         if dead is not None:
             initial = max(abs(initial), present)
         if not self.length.accepts(energy_fed_in, energy, initial):
@@ -169,6 +186,10 @@ class Explicit:
         if dead is not None and before is not None:
             ledger.work += dead.changed(before, state.u - 0.5 * du)
             ledger.loads = self.momentum.loads
+        if viscous is not None:
+            self._viscous, self._spare_viscous = new_viscous, viscous
+            self._compression = self.momentum.compression
+            ledger.viscous += viscous_work
         ledger.numerical -= energy_fed_in
         ledger.work += held
         ledger.elastic = self._elastic = elastic
@@ -178,6 +199,13 @@ class Explicit:
         state.grip = grip
         state.step += 1
         return True
+
+    def _viscous_work(self, viscous: tuple[np.ndarray, np.ndarray], force: tuple[np.ndarray, np.ndarray],
+                      du: np.ndarray, dt: float) -> float:
+        """What of the identity of a step is not of internal forces alone; viscous and whole forces before and after."""
+        (old, new), (F0, F1) = viscous, force
+        swing = new * (2 * F1 - new) - old * (2 * F0 - old)
+        return 0.5 * float(np.vdot(old + new, du)) - dt * dt / 8 * float(np.vdot(self._inverse, swing))
 
     def _give_up(self, state: State) -> None:
         """The step that was tried last left its velocities in `_next`."""
@@ -216,9 +244,11 @@ class Explicit:
         stored = momentum.set_gamma(state.gamma, state.deleted)
         mass = self.mass
         self._set_mass()
+        if self._viscous is not None:
+            self._viscous *= (self.mass / mass)[:, None]  # as the inertia, of kept accelerations
         ledger.sink_stored += stored - left
         ledger.deletion += left
-        half_v2 = _half_square(state.v)
+        half_v2 = half_square(state.v)
         ledger.sink_kinetic += float((mass - self.mass) @ half_v2)
         if dead is not None and loads is not None:
             ledger.work += dead.changed(loads, state.u)
@@ -275,19 +305,23 @@ class Explicit:
 
     def step_share(self, state: State) -> float:
         """The step over the stability limit of `state` as it is now; nothing is changed."""
-        return self.length.share(state.u, self.mass, self._inverse)
+        return self.length.share(state.u, self.mass, self._inverse, self._compression)
 
     # --- checkpoints ---
     def memory(self) -> dict[str, np.ndarray]:
         """What the integrator remembers beyond the state, for a checkpoint."""
+        contact = self.momentum.contact
         return {"reaction": self.reaction, "zone_depths": np.array([zone.depth for zone in self._zones], int),
                 **{name: np.array(getattr(self, name)) for name in self._REMEMBERED}, **self.length.memory(),
-                **({} if self.momentum.contact is None else {"contact_rest": self.momentum.contact.rest})}
+                **({} if self._viscous is None else {"viscous": self._viscous}),
+                **({} if contact is None else {"contact_rest": contact.rest})}
 
     def restore(self, state: State, memory: dict[str, np.ndarray]) -> None:
         """Go on exactly where :meth:`memory` was taken."""
         self.start(state)
         self.reaction = memory["reaction"]
+        if self._viscous is not None:
+            self._viscous = memory["viscous"]
         for name in self._REMEMBERED:
             setattr(self, name, memory[name].item())
         self.length.restore(memory)
@@ -295,52 +329,3 @@ class Explicit:
             self._pressed = contact.restore(memory["contact_rest"], contact.place(state.u))
         if self.density.zone is not None:
             self._zones = tuple(self.density.zone.of_depth(depth) for depth in memory["zone_depths"])
-
-
-def _half_square(v: np.ndarray) -> np.ndarray:
-    """|v|^2/2 of each row."""
-    half: np.ndarray = (v * v) @ np.full(v.shape[1], 0.5)  # several times as fast as einsum on rows of two
-    return half
-
-
-@njit(cache=True)
-def _move(now, free, grip_velocity, dt, new):  # type: ignore[no-untyped-def]
-    """From u, v, a: u after a step, v after half of it, and the increment of u."""
-    u, v, a = now
-    u_new, v_new, du = new
-    for n in range(u.shape[0]):
-        for i in range(u.shape[1]):
-            if free[n, i]:
-                v_new[n, i] = v[n, i] + 0.5 * dt * a[n, i]
-                du[n, i] = dt * v_new[n, i]
-            else:
-                v_new[n, i] = v[n, i]
-                du[n, i] = dt * grip_velocity[n, i]
-            u_new[n, i] = u[n, i] + du[n, i]
-
-
-@njit(cache=True)
-def _kick(motion, inverse, mass, forces, du, dt):  # type: ignore[no-untyped-def]
-    """Second half of the step: v at half of it goes to its end, and a is found there, from the forces before and after.
-
-    Returns trapezoidal work (all, held), kinetic energy, and the change of f.m^-1 f (free).
-    """
-    v, a, a_new = motion
-    old, force = forces
-    work, held, kinetic, swing = 0.0, 0.0, 0.0, 0.0
-    for n in range(v.shape[0]):
-        square = 0.0
-        for i in range(v.shape[1]):
-            f, one_by_m = force[n, i], inverse[n, i]
-            if one_by_m > 0.0:
-                f0 = -mass[n] * a[n, i]
-                a_new[n, i] = -f * one_by_m
-                v[n, i] += 0.5 * dt * a_new[n, i]
-                swing += (f * f - f0 * f0) * one_by_m
-                work += 0.5 * (f0 + f) * du[n, i]
-            else:
-                a_new[n, i] = a[n, i]
-                held += 0.5 * (old[n, i] + f) * du[n, i]
-            square += v[n, i] * v[n, i]
-        kinetic += 0.5 * mass[n] * square
-    return work + held, held, kinetic, swing

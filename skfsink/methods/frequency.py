@@ -1,4 +1,4 @@
-"""The highest eigenfrequency of a body, which limits the explicit step."""
+"""The highest eigenfrequency of a body, and the strongest damping, which limit the explicit step."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ..fem.pattern import Pattern
 from ..fields.momentum import Momentum
 from ..system.jit import njit
 
-__all__ = ["highest_frequency"]
+__all__ = ["highest_damping", "highest_frequency", "stable_step"]
 
 STEPS = 60      # of Lanczos's method, whose vectors are kept
 RESTARTS = 20   # from what they have found
@@ -27,16 +27,45 @@ def highest_frequency(momentum: Momentum, pattern: Pattern, free: np.ndarray, u:
     """
     if not pattern.size:  # every node is held: nothing swings
         return 0.0, np.zeros(0)
+    by_dof = np.repeat(mass, momentum.space.dim)[free]
+    square, mode = _greatest(pattern, momentum.tangent(pattern, u), by_dof, start, tolerance)
+    return float(np.sqrt(max(square, 0.0))), mode
+
+
+def highest_damping(momentum: Momentum, pattern: Pattern, free: np.ndarray, u: np.ndarray, mass: np.ndarray,
+                    *, compression: float = 0.0, tolerance: float = 1e-3) -> float:
+    """Greatest eigenvalue c [1/s] of  C(u) x = c M x  over the free unknowns, C the derivative of the viscous force.
+
+    Elements count as compressed by `compression`; see :meth:`.Momentum.viscous_tangent`. A mode of the frequency omega
+    and the damping ratio xi has c = 2 xi omega.
+    """
+    if not pattern.size:
+        return 0.0
+    data = momentum.viscous_tangent(pattern, u, np.zeros_like(u), compression)
+    damping, _ = _greatest(pattern, data, np.repeat(mass, momentum.space.dim)[free], None, tolerance)
+    return max(damping, 0.0)
+
+
+def stable_step(omega: float, damping: float) -> float:
+    """Limit of the explicit step [s] where viscous forces take the velocity half a step before; `omega` > 0.
+
+    With K <= omega^2 M and C <= c M every mode is stable for  dt^2 omega^2 + 2 dt c <= 4, which is
+    dt <= 2/omega (sqrt(1 + xi^2) - xi), xi = c/(2 omega); that the two extremes need not be one mode makes it shorter.
+    """
+    return 4.0 / (damping + float(np.hypot(damping, 2.0 * omega)))
+
+
+def _greatest(pattern: Pattern, data: np.ndarray, mass: np.ndarray, start: np.ndarray | None,
+              tolerance: float) -> tuple[float, np.ndarray]:
+    """Greatest eigenvalue of the matrix with this `data` over `mass` (size of the pattern), and its vector."""
     indptr, indices = pattern.indptr.view(np.uint32), pattern.indices.view(np.uint32)
-    data = momentum.tangent(pattern, u)
-    root = np.sqrt(np.repeat(mass, momentum.space.dim)[free])
+    root = np.sqrt(mass)
     _scale(indptr, indices, data, np.divide(1.0, root, out=np.zeros_like(root), where=root > 0.0))
     # The highest mode sits in one element, and the next one may sit in another, where the last result is zero: add
     # a vector that reaches everywhere, has no symmetry, and is the same every time.
     everywhere = np.sin(1.0 + np.arange(pattern.size) * 2.399963) * np.sqrt(2.0 / pattern.size)
     start = everywhere if start is None else everywhere + start
-    square, mode = _lanczos(indptr, indices, data, start / np.linalg.norm(start), tolerance)
-    return float(np.sqrt(max(square, 0.0))), mode
+    return _lanczos(indptr, indices, data, start / np.linalg.norm(start), tolerance)
 
 
 def _lanczos(indptr: np.ndarray, indices: np.ndarray, data: np.ndarray, start: np.ndarray,

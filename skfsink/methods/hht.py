@@ -1,6 +1,6 @@
 """Implicit Hilber-Hughes-Taylor integration (Eq. 25-29), with adaptive steps.
 
-    M a_{n+1} + (1 + alpha) F_{n+1} - alpha F_n = 0,        F: internal force less the dead loads,
+    M a_{n+1} + (1 + alpha) F_{n+1} - alpha F_n = 0,        F: internal and viscous force less the dead loads,
     u_{n+1} = u_n + dt v_n + dt^2 [(1/2 - beta) a_n + beta a_{n+1}],
     v_{n+1} = v_n + dt [(1 - g) a_n + g a_{n+1}],       beta = (1 - alpha)^2/4,  g = 1/2 - alpha.
 
@@ -30,7 +30,7 @@ from ..fields.density import Density
 from ..fields.energy import Ledger
 from ..fields.state import State
 from .controls import EventControls, HHTControls
-from .hht_ledger import Balance, book_motion, book_sink
+from .hht_ledger import Balance, book_motion, book_sink, book_viscous
 from .hht_trial import Scheme, Trial
 
 __all__ = ["HHT"]
@@ -81,7 +81,7 @@ class HHT:
 
     @property
     def reaction(self) -> np.ndarray:
-        """Internal force of the last accepted state, less the dead loads, (n, dim)."""
+        """Internal and viscous force of the last accepted state, less the dead loads, (n, dim)."""
         return self._now.force
 
     @property
@@ -92,15 +92,25 @@ class HHT:
     def start(self, state: State) -> None:
         """Forces and masses of `state`; after a resume :meth:`restore` does it."""
         self._grip_velocity, self._knot = self.loading.velocity(state.grip), self.loading.knot(state.grip)
-        force = self.body.take(state)
+        self.momentum.set_time(state.grip)
+        self.momentum.set_gamma(state.gamma, state.deleted)
+        force, viscous = self._forces(state)
         self._loads = self._dead_loads
         self._now = Balance(force, -force.ravel()[self.free], self.momentum.gamma, self.momentum.W,
-                            self.inertia.matrix(), self.inertia.places())
+                            self.inertia.matrix(), self.inertia.places(), viscous)
+
+    def _forces(self, state: State) -> tuple[np.ndarray, np.ndarray | None]:
+        """Internal and viscous force of a state less the dead loads, and the viscous one, None without viscosity."""
+        force = self.momentum.force(state.u)
+        if not self.momentum.is_viscous:
+            return force, None
+        viscous = self.momentum.viscous_force(state.u, state.v)
+        return force + viscous, viscous
 
     def begin(self, state: State) -> None:
         """Set the body in motion: accelerations from the forces, energies of the start."""
+        state.v[self._held] = self.loading.velocity(state.grip)[self._held]
         self.start(state)
-        state.v[self._held] = self._grip_velocity[self._held]
         self.solver.factorize(self._now.mass)
         state.a[...] = 0.0
         state.a.reshape(-1)[self.free] = self.solver.solve(self._now.inertia)
@@ -159,8 +169,9 @@ class HHT:
         ledger.drop(self.space.w, old.W, old.gamma, momentum.gamma)
         places, mass = self.inertia.places(), self.inertia.matrix()
         ledger.sink_kinetic += float(np.vdot(old.places - places, self.inertia.half_v2(state.v)))
-        self._now = Balance(momentum.force(state.u), self.inertia.times(mass, state.a.ravel()[self.free]),
-                            momentum.gamma, old.W, mass, places)
+        force, viscous = self._forces(state)
+        self._now = Balance(force, self.inertia.times(mass, state.a.ravel()[self.free]), momentum.gamma, old.W, mass,
+                            places, viscous)
 
     @property
     def _dead_loads(self) -> np.ndarray | None:
@@ -175,12 +186,9 @@ class HHT:
     # --- a step that is taken ---
     def _accept(self, state: State, trial: Trial) -> bool:
         """Take a step; False, and nothing has changed, if the scheme feeds in too much energy in it."""
-        momentum, free, dt = self.momentum, self.free, trial.dt
-        new = Balance(trial.force, -trial.weighted, momentum.gamma, momentum.W, trial.mass, self.inertia.places())
-        g = self.controls.newmark_gamma
-        a0, a1 = state.a.ravel()[free], trial.a.ravel()[free]
-        v = state.v.copy()
-        v.reshape(-1)[free] = state.v.ravel()[free] + dt * ((1 - g) * a0 + g * a1)
+        momentum, dt, v = self.momentum, trial.dt, trial.velocity
+        new = Balance(trial.force, -trial.weighted, momentum.gamma, momentum.W, trial.mass, self.inertia.places(),
+                      trial.viscous)
         ledger = replace(state.ledger)
         loads = self._book(ledger, state, trial, new, v)
         energy = max(abs(ledger.initial), ledger.elastic + ledger.kinetic, self.momentum.energy,
@@ -199,6 +207,9 @@ class HHT:
         if trial.end == self._knot:
             self._grip_velocity, self._knot = self.loading.velocity(trial.end), self.loading.knot(trial.end)
             state.v[self._held] = self._grip_velocity[self._held]
+            if self.momentum.is_viscous:
+                force, viscous = self._forces(state)
+                self._now = self._now._replace(force=force, viscous=viscous)
         return True
 
     def _book(self, ledger: Ledger, state: State, trial: Trial, new: Balance, v: np.ndarray) -> np.ndarray | None:
@@ -212,6 +223,7 @@ class HHT:
         held = float((0.5 * (old.force + new.force) * du)[self._held].sum())
         ledger.numerical += held - stored - motion
         ledger.work += held
+        book_viscous(ledger, old, new, du)
         if dead is not None and self._loads is not None:
             ledger.numerical += dead.effort(self._loads, du)
             ledger.work += dead.changed(self._loads, state.u + 0.5 * du)
@@ -232,9 +244,9 @@ class HHT:
         state.a[dead] = 0.0
         ledger.kinetic = self.inertia.kinetic(mass, state.v)
         ledger.deletion += moving - ledger.kinetic  # with what the mass floor of dead nodes still had
-        force = momentum.force(state.u)
+        force, viscous = self._forces(state)
         ledger.elastic, ledger.loads = momentum.energy, momentum.loads
-        self._now = Balance(force, new.inertia, momentum.gamma, momentum.W, mass, places)
+        self._now = Balance(force, new.inertia, momentum.gamma, momentum.W, mass, places, viscous)
 
     def step_share(self, state: State) -> float:
         """Infinity: the scheme has no stability limit."""

@@ -10,7 +10,7 @@ from ..fields.energy import Ledger
 from .controls import HHTControls
 from .inertia import Inertia
 
-__all__ = ["Balance", "book_motion", "book_sink"]
+__all__ = ["Balance", "book_motion", "book_sink", "book_viscous"]
 
 
 class Balance(NamedTuple):
@@ -18,10 +18,11 @@ class Balance(NamedTuple):
 
     Attributes
     ----------
-    force: internal force less the dead loads, (n, dim).
+    force: internal and viscous force less the dead loads, (n, dim).
     inertia: M a over the free unknowns, as the scheme has it.
     gamma, W: relative density and stored energy [MPa] at the Gauss points, (ne, nq).
     mass: data of the mass matrix.   places: mass by place, see :meth:`.Inertia.places`.
+    viscous: viscous force in `force`, None without viscosity.
     """
 
     force: np.ndarray
@@ -30,6 +31,16 @@ class Balance(NamedTuple):
     W: np.ndarray
     mass: np.ndarray
     places: np.ndarray
+    viscous: np.ndarray | None = None
+
+
+def book_viscous(ledger: Ledger, old: Balance, new: Balance, du: np.ndarray) -> None:
+    """Book the work against viscosity over the displacement `du` (n, dim) of a step, apart from what the scheme takes.
+    """
+    if old.viscous is not None and new.viscous is not None:
+        work = 0.5 * float(np.vdot(old.viscous + new.viscous, du))
+        ledger.viscous += work
+        ledger.numerical -= work
 
 
 def book_sink(ledger: Ledger, w: np.ndarray, old: Balance, new: Balance,

@@ -60,7 +60,8 @@ class Trial:
     Attributes
     ----------
     u, a: displacement [mm] and acceleration [mm/s^2] at its end, (n, dim).
-    density: relative density at its end.   force: internal force less the dead loads there, (n, dim).
+    density: relative density at its end.   force: internal and viscous force less the dead loads there, (n, dim).
+    viscous: viscous force in it, None without viscosity.
     weighted: forces as the scheme weights them, (1 + alpha) F_{n+1} - alpha F_n, over the free unknowns.
     mass: data of the mass matrix.   corrections: Newton steps made.
     cracked: whether it was given up since a crack had run through it.
@@ -74,6 +75,7 @@ class Trial:
         self.scheme, self.state, self.old, self.dt, self.end = scheme, state, old, dt, end
         self.momentum, self._free = scheme.body.momentum, scheme.body.free
         self.density = Density(state.gamma, state.sink)
+        self.viscous: np.ndarray | None = None
         self.corrections, self.cracked = 0, False
         self._correction = self._change = np.inf  # the last ones of displacement [mm] and gamma
         self._settled, self._growing = scheme.controls.coupling == "single", 0
@@ -117,10 +119,22 @@ class Trial:
         if not np.isfinite(self.momentum.energy):
             raise _Rejected
 
+    @property
+    def velocity(self) -> np.ndarray:
+        """Velocity at the end by Newmark's formula (n, dim); what is held moves as at the beginning."""
+        free, g = self._free, self.scheme.controls.newmark_gamma
+        a0, a1 = self.state.a.ravel()[free], self.a.ravel()[free]
+        v = self.state.v.copy()
+        v.reshape(-1)[free] = self.state.v.ravel()[free] + self.dt * ((1 - g) * a0 + g * a1)
+        return v
+
     def _residual(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Residual of Eq. (26), inertia in it, and the mask of what still has mass, over the free unknowns."""
         alpha, body = self.scheme.controls.alpha, self.scheme.body
         self._evaluate()
+        if self.momentum.is_viscous:
+            self.viscous = self.momentum.viscous_force(self.u, self.velocity)
+            self.force += self.viscous
         inertia = self.scheme.inertia.times(self.mass, self.a.ravel()[self._free])
         self.weighted = ((1 + alpha) * self.force - alpha * self.old.force).ravel()[self._free]
         whole = body.space.lump(self.momentum.gamma) > 1e-3 * body.density.load
@@ -155,6 +169,9 @@ class Trial:
         try:
             if fresh:
                 tangent = self.momentum.tangent(scheme.pattern, self.u)
+                if self.momentum.is_viscous:
+                    rate = scheme.controls.newmark_gamma * self.dt / factor  # dv/du
+                    tangent += rate * self.momentum.viscous_tangent(scheme.pattern, self.u, self.velocity)
                 scheme.solver.factorize(self.mass / factor + (1 + scheme.controls.alpha) * tangent)
             d = scheme.solver.solve(-residual, tolerance=1e-8)
         except ConvergenceError:

@@ -1,8 +1,8 @@
 """Length of the explicit step: a share of the stability limit, cut where the scheme feeds in or takes out energy.
 
-The limit 2/omega_max is estimated now and then, and followed by a cheap indicator between. A step that changes the
-energy by more than a tolerance is rejected, and made again half as long; when steps have been calm for a while, their
-length doubles again.
+The limit, 2/omega_max or less with viscosity, is estimated now and then, and followed by a cheap indicator between. A
+step that changes the energy by more than a tolerance is rejected, and made again half as long; when steps have been
+calm for a while, their length doubles again.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from ..fem.pattern import Pattern
 from ..fields.momentum import Momentum
 from .controls import ExplicitControls
-from .frequency import highest_frequency
+from .frequency import highest_damping, highest_frequency, stable_step
 
 __all__ = ["StepLength"]
 
@@ -38,14 +38,16 @@ class StepLength:
     cut: how often the step is halved at present.   fixed: see :meth:`fix`, 0 if the step follows the limit.
     """
 
-    CHECK = 5        # steps between looks at the cheap indicator
+    CHECK = 5        # steps between looks at the cheap indicator; 1 where the damping grows with the compression
     RISEN = 25       # steps after which a risen indicator calls for an estimate; until then the step follows it
     FALLEN = 100     # steps after which a fallen one does; until then the step is shorter than it need be
     FED_IN = 1e-6    # energy a step may feed in, of the initial one, before the limit is estimated anew
     CALM = 20        # steps without a rejection after which the step doubles
+    COMPRESSED = 1e-3  # compression of an element, L/c_d times its rate, that is counted on at least
     CUTS = 20        # halvings at which the integration gives up: a millionth of the limit
 
-    kept = ("dt", "estimates", "rejected", "cut", "urgent", "_omega", "_indicator0", "_last_estimate", "_calm")
+    kept = ("dt", "estimates", "rejected", "cut", "urgent", "_omega", "_indicator0", "_last_estimate", "_calm",
+            "_damping", "_compression")
 
     def __init__(self, momentum: Momentum, free: np.ndarray, controls: ExplicitControls, longest: float) -> None:
         self.momentum, self.free, self.controls = momentum, free, controls
@@ -54,7 +56,7 @@ class StepLength:
         self._pattern = Pattern(momentum.space, momentum.space.dim, free, upper=True)
         self.dt = 0.0
         self.estimates = self.rejected = self.cut = self._calm = 0
-        self._omega = self._indicator0 = 0.0
+        self._omega = self._indicator0 = self._damping = self._compression = 0.0
         self._last_estimate = 0
         self.fixed, self.urgent = 0.0, False
         self.mode: np.ndarray | None = None
@@ -63,12 +65,14 @@ class StepLength:
         """Let every step be `dt` [s] long, whatever the limit is; none is rejected."""
         self.fixed, self.dt = dt, dt
 
-    def look(self, step: int, u: np.ndarray, mass: np.ndarray, inverse: np.ndarray) -> None:
+    def look(self, step: int, u: np.ndarray, mass: np.ndarray, inverse: np.ndarray, compression: float = 0.0) -> None:
         """Set `dt` before step number `step`, from the displacement (n, dim) and masses (n,).
 
-        `inverse` are the inverse masses (n, dim), zero where a degree of freedom is held.
+        `inverse` are the inverse masses (n, dim), zero where a degree of freedom is held; `compression` is the greatest
+        one of an element, see :attr:`.Momentum.compression`.
         """
-        if self.fixed or not (self.mode is None or self.urgent or step % self.CHECK == 0):
+        every = 1 if self.momentum.bulk_viscosity.quadratic > 0.0 else self.CHECK
+        if self.fixed or not (self.mode is None or self.urgent or step % every == 0):
             return
         c = self.controls
         indicator = self.momentum.stiffest(u, inverse)
@@ -78,18 +82,30 @@ class StepLength:
         if self.mode is None or self.urgent or moved or since >= c.estimate_every:
             self._omega, self.mode = highest_frequency(self.momentum, self._pattern, self.free, u, mass, self.mode)
             self._omega = max(self._omega, indicator**0.5)  # a Rayleigh quotient, in case Lanczos missed that element
+            if self.momentum.is_viscous:
+                self._compression = max(compression, self.COMPRESSED)
+                self._damping = highest_damping(self.momentum, self._pattern, self.free, u, mass,
+                                                compression=self._compression)
             self._indicator0, self._last_estimate, ratio = indicator, step, 1.0
             self.estimates += 1
             self.urgent = False
         swings = self._omega > 0.0  # else every node is held
         omega = self._with_contact(self._omega * np.sqrt(max(1.0, ratio)), u)
         dt = float(c.courant * 2.0 / omega) if swings else self._still
+        if swings and self.momentum.is_viscous:
+            slope = self.momentum.bulk_viscosity.slope
+            risen = max(1.0, slope(compression) / slope(self._compression)) if slope(self._compression) else 1.0
+            dt = c.courant * stable_step(omega, self._damping * max(1.0, ratio) * risen)
         self.dt = min(dt, self._longest) * 0.5**self.cut  # in plane stress the stable step may be longer
 
-    def share(self, u: np.ndarray, mass: np.ndarray, inverse: np.ndarray) -> float:
+    def share(self, u: np.ndarray, mass: np.ndarray, inverse: np.ndarray, compression: float = 0.0) -> float:
         """The step over the stability limit of a body as it is now; nothing is changed."""
         omega, _ = highest_frequency(self.momentum, self._pattern, self.free, u, mass, self.mode)
-        return 0.5 * self.dt * self._with_contact(max(omega, self.momentum.stiffest(u, inverse) ** 0.5), u)
+        omega = self._with_contact(max(omega, self.momentum.stiffest(u, inverse) ** 0.5), u)
+        if self.momentum.is_viscous and omega > 0.0:
+            damping = highest_damping(self.momentum, self._pattern, self.free, u, mass, compression=compression)
+            return self.dt / stable_step(omega, damping)
+        return 0.5 * self.dt * omega
 
     def _with_contact(self, omega: float, u: np.ndarray) -> float:
         """Bound of the highest frequency with contact, from that without it [1/s]."""

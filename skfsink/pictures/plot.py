@@ -41,6 +41,7 @@ GAMMA_MAP = LinearSegmentedColormap.from_list("relative density", [
 #: Bands of the ledger from the bottom up: what is lost (warm), then what is still there (cool).
 BANDS = {"sink_stored": ("$D$, from stored energy", "#a63d40"), "sink_kinetic": ("$D$, from motion", "#e08e79"),
          "deletion": ("left in deleted elements", "#7a6c5d"), "released": ("released in relaxing", "#f2cc8f"),
+         "viscous": ("viscous", "#c6b38e"),
          "kinetic": ("kinetic", "#86bbd8"), "elastic": ("elastic", "#33658a"), "contact": ("contact", "#5b8e7d"),
          "numerical": ("numerical", "#9b9b9b")}
 RED, BLUE, SAND = (BANDS[name][1] for name in ("sink_stored", "elastic", "released"))

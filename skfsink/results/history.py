@@ -26,7 +26,7 @@ class Column(NamedTuple):
     meaning: in words.
     unit: for a plane body: "1" for plain numbers, "" for words. N/mm and N mm/mm are N and N mm for one in space.
     kind: of its values.
-    before: its value in files that were written before there was the column; None if there are no such files.
+    before: its value in files without the column, as those of before there was one; None if there are no such files.
     """
 
     meaning: str
@@ -54,6 +54,7 @@ HISTORY_COLUMNS: dict[str, Column] = {
     "deletion": Column("energy left in elements when they were deleted", _ENERGY),
     "numerical": Column("dissipation of the time integration", _ENERGY),
     "released": Column("energy given up in relaxing to equilibrium", _ENERGY),
+    "viscous": Column("work done against viscosity; only in dynamic runs that have one", _ENERGY, before=0.0),
     "U_paper": Column("U of the paper (Eq. 30, 32)", _ENERGY),
     "balance": Column("what the energies fail to add up to", _ENERGY),
     "tip_x_mm": Column("position of the leading tip, undeformed", "mm"),

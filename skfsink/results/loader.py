@@ -46,6 +46,7 @@ ENERGIES: tuple[tuple[str, tuple[str, ...], str], ...] = (
     ("D_kinetic", ("sink_kinetic",), "of D: from motion"),
     ("deletion", ("deletion",), "left in deleted elements"),
     ("numerical", ("numerical",), "dissipated by the time integration"),
+    ("viscous", ("viscous",), "dissipated by viscosity"),
     ("released", ("released",), "released in relaxing to equilibrium"),
     ("work", ("work",), "work of the grips during the event"),
     ("balance", ("balance",), "balance: what does not add up"),
@@ -222,7 +223,10 @@ class Run:
 
     @cached_property
     def energies(self) -> dict[str, Energy]:
-        """Where the energy of the event is, by name of `ENERGIES`; empty before the event."""
+        """Where the energy of the event is, by name of `ENERGIES`; empty before the event.
+
+        `viscous` is there where it is not zero.
+        """
         event = self.event
         if not event["step"].size:
             return {}
@@ -230,6 +234,8 @@ class Run:
         found = {}
         for name, columns, meaning in ENERGIES:
             values = np.sum([event[column] for column in columns], axis=0)
+            if name == "viscous" and not values.any():
+                continue
             found[name] = Energy(meaning, event.units[columns[0]], float(values[0]),
                                  None if row is None else float(values[row]), float(values[-1]))
         return found

@@ -234,6 +234,15 @@ def warn(scene: Scene, folder: Path) -> None:
                     "; ".join(dict.fromkeys(m.cure for m in motions)))
     if _dynamic(scene):
         _warn_of_events(scene, loading, folder)
+    elif _is_viscous(scene):
+        log.warning("viscosity has no effect in a quasi-static analysis, which has no velocities: take --analysis "
+                    "dynamic, or leave it out")
+
+
+def _is_viscous(scene: Scene) -> bool:
+    c = scene.controls
+    return bool(c.bulk_viscosity_linear or c.bulk_viscosity_quadratic
+                or any(part.material.viscosity for part in scene.parts))
 
 
 def _warn_of_material(scene: Scene, part: Region) -> None:

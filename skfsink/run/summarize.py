@@ -59,6 +59,7 @@ def summarize(scene: Scene, simulation: Simulation) -> dict[str, Any]:
                    "initial": ledger.initial, "elastic_final": ledger.elastic, "kinetic_final": ledger.kinetic,
                    "external_work": onset.get("work", 0.0) + ledger.work, "deletion": ledger.deletion,
                    "numerical": ledger.numerical, "released": ledger.released, "contact": ledger.contact,
+                   **({"viscous": ledger.viscous} if ledger.viscous else {}),
                    "balance_error_relative": max(balances, default=0.0) / onset["elastic_energy"] if onset else None},
         "quantities": measured(scene, simulation), "model": dict(scene.model_choice) or None,
         "whole": {"energy": scene.whole.energy, "load": scene.whole.load, "displacement": scene.whole.displacement},

@@ -54,6 +54,7 @@ class Controls:
     active_zone: explicit steps solve for gamma only where it changes (see :mod:`.active_zone`).
     contact: the lips of cracks bear on each other (see :mod:`.contact`), in explicit events and quasi-static passes.
     kernels: "compiled", or "forms" (scikit-fem forms, for small meshes), or another name in :data:`.BACKENDS`.
+    bulk_viscosity_linear, bulk_viscosity_quadratic: coefficients b1 and b2 of the bulk viscosity, [0, 10].
     """
 
     analysis: str = "dynamic"
@@ -75,6 +76,8 @@ class Controls:
     active_zone: bool = True
     contact: bool = False
     kernels: str = "compiled"
+    bulk_viscosity_linear: float = 0.0
+    bulk_viscosity_quadratic: float = 0.0
     explicit: ExplicitControls = field(default_factory=ExplicitControls)
     hht: HHTControls = field(default_factory=HHTControls)
     statics: StaticsControls = field(default_factory=StaticsControls)
@@ -103,6 +106,10 @@ class Controls:
         require("aftermath", self.aftermath, "s", low=0)
         require("balance_tolerance", self.balance_tolerance, low=0, high=1, low_open=True)
         require("threads", self.threads, low=0, high=256, whole=True)
+        for name in ("bulk_viscosity_linear", "bulk_viscosity_quadratic"):
+            if require(name, getattr(self, name), low=0, high=10) and ELEMENTS[self.element].thin_sheet:
+                raise ParameterError(f"{name} is for elements whose volume changes; element {self.element} is a sheet "
+                                     f"that thins freely: take viscosity; got {getattr(self, name)!r}")
 
     def workers(self, dim: int) -> int:
         """Number of threads to use for a body of that dimension, >= 1."""

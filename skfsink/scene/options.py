@@ -101,6 +101,8 @@ class Options:
         Bulk modulus k [MPa], > 0.
     density
         Density of the intact material ρ0 [kg/m^3], > 0.
+    viscosity
+        Shear viscosity η of the material [MPa s], >= 0: a stress 2 η dev d beside the elastic one, in dynamic analyses.
     phi
         Energy limiter Φ [MPa], > 0; 0 takes the one that belongs to the law's default constants (aaa: 0.1686).
     m
@@ -132,6 +134,10 @@ class Options:
         What evaluates the weak forms: "compiled" (element loops) or "forms" (scikit-fem, for small meshes).
     contact
         The lips of a crack bear on each other instead of passing through; not with the integrator hht.
+    bulk_viscosity_linear
+        Linear coefficient b1 of the bulk viscosity of elements, in [0, 10]; typical 0.06.
+    bulk_viscosity_quadratic
+        Quadratic coefficient b2 of the bulk viscosity, for elements that are compressed, in [0, 10]; typical 1.2.
     event_time
         Longest dynamic event [s], > 0.
     aftermath
@@ -196,6 +202,7 @@ class Options:
     constants: Annotated[str, MATERIAL] = ""
     bulk_modulus: Annotated[float, MATERIAL, Unit("MPa")] = AAA.bulk_modulus
     density: Annotated[float, MATERIAL, Unit("kg/m^3")] = AAA.density
+    viscosity: Annotated[float, MATERIAL, Unit("MPa s")] = AAA.viscosity
     phi: Annotated[float, SINK, Unit("MPa")] = 0.0
     m: Annotated[float, SINK, Parameter(name=["--m"])] = SinkLaw.m
     length_scale: Annotated[float, SINK, Unit("mm")] = SinkLaw.length_scale
@@ -211,6 +218,8 @@ class Options:
     element: Annotated[str, ANALYSIS] = Controls.element
     kernels: Annotated[str, ANALYSIS] = Controls.kernels
     contact: Annotated[bool, CONTACT] = Controls.contact
+    bulk_viscosity_linear: Annotated[float, ANALYSIS] = Controls.bulk_viscosity_linear
+    bulk_viscosity_quadratic: Annotated[float, ANALYSIS] = Controls.bulk_viscosity_quadratic
     event_time: Annotated[float, ANALYSIS, Unit("s")] = Controls.event_time
     aftermath: Annotated[float, ANALYSIS, Unit("s")] = Controls.aftermath
     courant: Annotated[float, EXPLICIT] = ExplicitControls.courant
@@ -258,13 +267,13 @@ class Options:
     def stored_energy(self) -> Material:
         """The material."""
         if self.material == "aaa" and not self.constants.strip():
-            return AAA(self.bulk_modulus, self.density, self.c1, self.c2)
+            return AAA(self.bulk_modulus, self.density, self.c1, self.c2, viscosity=self.viscosity)
         text = self._constants()
         of_nu = own_constants(self.material, text)[1] if self.material in MATERIALS else None
         if of_nu is not None and ("bulk_modulus" in self.given_names or self.bulk_modulus != Options.bulk_modulus):
             raise ParameterError(f"bulk_modulus {self.bulk_modulus!r} MPa and the nu of the constants ({of_nu:.6g} "
                                  f"MPa) say the same: give one of them")
-        return material_of(self.material, text, self.bulk_modulus, self.density)
+        return material_of(self.material, text, self.bulk_modulus, self.density, self.viscosity)
 
     def _constants(self) -> str:
         """Text of the constants of the law, with those of aaa that are options of their own."""

@@ -17,6 +17,7 @@ from .density import DensityForms, density_forms, row_sums
 from .kinematics import element_mean
 from .momentum import MomentumForms, momentum_forms
 from .sheet import plane_stress_forms
+from .viscous import BulkViscosity, ViscousForms, viscous_forms
 
-__all__ = ["DensityForms", "MomentumForms", "density_forms", "element_mean", "momentum_forms", "plane_stress_forms",
-           "row_sums"]
+__all__ = ["BulkViscosity", "DensityForms", "MomentumForms", "ViscousForms", "density_forms", "element_mean",
+           "momentum_forms", "plane_stress_forms", "row_sums", "viscous_forms"]

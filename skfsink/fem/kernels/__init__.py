@@ -6,6 +6,7 @@ tiles              the memory layout those two work on, a region of the body aft
 tangent            tangent stiffness with material, geometric and J_bar coupling
 general, general_tangent   force and tangent for laws of several invariants, and fibres
 plane_stress       all of these for thin sheets
+viscous            viscous force, and its derivative with the velocity
 pieces             elements of a region for the second derivatives
 scalar             mass, Laplacian and sink matrices
 gradient           the Laplacian without positive off-diagonals
@@ -14,9 +15,12 @@ gradient           the Laplacian without positive off-diagonals
 from .general_tangent import tangent_general
 from .gradient import LEAST_JACOBIAN, monotone, monotone_laplacian
 from .plane_stress import tangent_plane_stress
+from .records import Viscous
 from .scalar import laplacian, mass, weighted_mass
 from .tangent import ERSATZ_STIFFNESS, SOFT_GAMMA, tangent
 from .tiles import Law, Tiles
+from .viscous import viscous_tangent
 
-__all__ = ["ERSATZ_STIFFNESS", "LEAST_JACOBIAN", "SOFT_GAMMA", "Law", "Tiles", "laplacian", "mass", "monotone",
-           "monotone_laplacian", "tangent", "tangent_general", "tangent_plane_stress", "weighted_mass"]
+__all__ = ["ERSATZ_STIFFNESS", "LEAST_JACOBIAN", "SOFT_GAMMA", "Law", "Tiles", "Viscous", "laplacian", "mass",
+           "monotone", "monotone_laplacian", "tangent", "tangent_general", "tangent_plane_stress", "viscous_tangent",
+           "weighted_mass"]

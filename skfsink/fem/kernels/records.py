@@ -8,7 +8,7 @@ import numpy as np
 
 from ...system.jit import njit
 
-__all__ = ["Elements", "Piece", "Solid", "Volumetric", "share"]
+__all__ = ["Elements", "Piece", "Solid", "Viscous", "Volumetric", "share"]
 
 
 class Elements(NamedTuple):
@@ -48,6 +48,24 @@ class Solid(NamedTuple):
     shear_modulus: float
     j_bar: bool
     convex: bool
+
+
+class Viscous(NamedTuple):
+    """The viscosity of a material in its elements; see :mod:`.viscous`.
+
+    Attributes
+    ----------
+    eta: shear viscosity [MPa s].   sheet: whether the elements are a thin sheet.
+    speed, impedance: c_d [mm/s], and rho0 c_d [t/(mm^2 s)].
+    linear, quadratic: b1 and b2 of the bulk viscosity.
+    """
+
+    eta: float
+    sheet: bool
+    speed: float
+    impedance: float
+    linear: float
+    quadratic: float
 
 
 class Piece(NamedTuple):

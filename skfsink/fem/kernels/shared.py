@@ -15,9 +15,10 @@ from .general import force_general_2d, force_general_3d
 from .lanes import FAST
 from .plane_stress import force_plane_stress
 from .records import share
+from .viscous import viscous_2d, viscous_3d
 from .volumetric import volumetric_2d, volumetric_3d
 
-__all__ = ["FORCES", "GENERAL_FORCES", "VOLUMETRIC"]
+__all__ = ["FORCES", "GENERAL_FORCES", "VISCOUS", "VOLUMETRIC"]
 
 Loops = tuple[Callable[..., float], Callable[..., None]]   #: for one thread, and for several
 
@@ -52,8 +53,22 @@ def _indicator(loop: Any) -> Loops:
     return loop, shared
 
 
+def _viscous(loop: Any) -> Loops:
+    """A loop for the viscous force, and the same shared."""
+    body = njit(fastmath=FAST)(loop.py_func)
+
+    @njit(cache=True, parallel=True)
+    def shared(viscous, x, v, elements, returned):  # type: ignore[no-untyped-def]
+        shares = returned.size
+        for s in prange(shares):
+            returned[s] = body(viscous, x, v, share(elements, s, shares))
+
+    return loop, shared
+
+
 #: by dimension; 0 is plane stress
 FORCES = {2: _force(force_2d), 3: _force(force_3d), 0: _force(force_plane_stress)}
 #: of laws of several invariants
 GENERAL_FORCES = {2: _force(force_general_2d), 3: _force(force_general_3d)}
 VOLUMETRIC = {2: _indicator(volumetric_2d), 3: _indicator(volumetric_3d)}
+VISCOUS = {2: _viscous(viscous_2d), 3: _viscous(viscous_3d)}

@@ -24,9 +24,9 @@ from ..space import Space
 from .faster import Faster
 from .lanes import LANES, LANES_3D
 from .plane_stress import stiffness_plane_stress
-from .records import Elements, Volumetric
+from .records import Elements, Viscous, Volumetric
 from .relax import relax
-from .shared import FORCES, GENERAL_FORCES, VOLUMETRIC, Loops
+from .shared import FORCES, GENERAL_FORCES, VISCOUS, VOLUMETRIC, Loops
 
 __all__ = ["Law", "Tiles"]
 
@@ -93,6 +93,7 @@ class Tiles:
         most: int = numba.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]
         self.threads = 1 if space.w.size < self.WORTH else min(threads, most)
         self._faster: dict[object, Faster] = {}
+        self._viscous: tuple[np.ndarray, list[Elements]] | None = None
         start, entry = space.incidence
         element, local = np.divmod(entry, na)
         tile, lane = np.divmod(np.arange(self.count * self.lanes)[self._place][element], self.lanes)
@@ -152,6 +153,26 @@ class Tiles:
                                             Volumetric(law.bulk_modulus, j_bar), x, part.elements))
         _sum_at_nodes(self._force.reshape(-1), self._start, self._offset, self.lanes, out)
         return least
+
+    def viscous_force(self, x: np.ndarray, v: np.ndarray, laws: Sequence[Viscous], out: np.ndarray) -> float:
+        """Viscous force at positions `x` and velocities `v` (n, dim) [mm; mm/s] into `out` (n, dim) [N, or N/mm in 2D].
+
+        `laws` are those of the parts. Returns the greatest compression -L/c_d min(0, D) of an element with gamma > 0,
+        0 without bulk viscosity. What :meth:`force` has left is not touched.
+        """
+        if self._viscous is None:
+            force, first, parts = np.empty_like(self._force), 0, []
+            for part in self._parts:
+                end = first + len(part.elements.conn)
+                parts.append(part.elements._replace(force=force[first:end]))
+                first = end
+            self._viscous = force, parts
+        force, parts = self._viscous
+        greatest = 0.0
+        for number, (law, elements) in enumerate(zip(laws, parts)):
+            greatest = max(greatest, *self._share(VISCOUS[self.space.dim], number, law, x, v, elements))
+        _sum_at_nodes(force.reshape(-1), self._start, self._offset, self.lanes, out)
+        return greatest
 
     def _share(self, loops: Loops, part: int, *arguments: object) -> list[float]:
         """What the shares of a loop return, from one thread or several, whichever was faster when last compared."""

@@ -39,7 +39,7 @@ VALUES: dict[str, Callable[[View], Any]] = {
     "grip_displacement_mm": lambda view: view.displacement,
     "reaction_N_per_mm": lambda view: view.load,
     **{name: _energy(name) for name in ("elastic", "loads", "contact", "kinetic", "work", "sink_stored", "sink_kinetic",
-                                        "deletion", "numerical", "released", "balance")},
+                                        "deletion", "numerical", "released", "viscous", "balance")},
     "U_paper": _energy("paper"),
     "tip_x_mm": _tip(0), "tip_y_mm": _tip(1), "tip_z_mm": _tip(2),
     "crack_length_mm": lambda view: view.tips.length,
@@ -93,7 +93,9 @@ class History(Observer):
 
     def prepare(self, view: View) -> None:
         """Begin the file with the rows so far."""
-        without = () if view.body.momentum.contact else ("contact",)
+        momentum = view.body.momentum
+        asked = {"contact": momentum.contact is not None, "viscous": momentum.is_viscous and not view.quasistatic}
+        without = [name for name, is_asked in asked.items() if not is_asked]
         self._table = Rows(view.folder / "history.csv", self._kept, view.body.space.dim, without)
 
     def loading(self, view: View) -> None:

@@ -1,0 +1,58 @@
+"""The two halves of an explicit step at the nodes: displacements first, and after the force the velocities."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..system.jit import njit
+
+__all__ = ["half_square", "kick", "move"]
+
+
+def half_square(v: np.ndarray) -> np.ndarray:
+    """|v|^2/2 of each row."""
+    half: np.ndarray = (v * v) @ np.full(v.shape[1], 0.5)  # several times as fast as einsum on rows of two
+    return half
+
+
+@njit(cache=True)
+def move(now, free, grip_velocity, dt, new):  # type: ignore[no-untyped-def]
+    """From u, v, a: u after a step, v after half of it, and the increment of u."""
+    u, v, a = now
+    u_new, v_new, du = new
+    for n in range(u.shape[0]):
+        for i in range(u.shape[1]):
+            if free[n, i]:
+                v_new[n, i] = v[n, i] + 0.5 * dt * a[n, i]
+                du[n, i] = dt * v_new[n, i]
+            else:
+                v_new[n, i] = v[n, i]
+                du[n, i] = dt * grip_velocity[n, i]
+            u_new[n, i] = u[n, i] + du[n, i]
+
+
+@njit(cache=True)
+def kick(motion, inverse, mass, forces, du, dt):  # type: ignore[no-untyped-def]
+    """Second half of the step: v at half of it goes to its end, and a is found there, from the forces before and after.
+
+    Returns trapezoidal work (all, held), kinetic energy, and the change of f.m^-1 f (free).
+    """
+    v, a, a_new = motion
+    old, force = forces
+    work, held, kinetic, swing = 0.0, 0.0, 0.0, 0.0
+    for n in range(v.shape[0]):
+        square = 0.0
+        for i in range(v.shape[1]):
+            f, one_by_m = force[n, i], inverse[n, i]
+            if one_by_m > 0.0:
+                f0 = -mass[n] * a[n, i]
+                a_new[n, i] = -f * one_by_m
+                v[n, i] += 0.5 * dt * a_new[n, i]
+                swing += (f * f - f0 * f0) * one_by_m
+                work += 0.5 * (f0 + f) * du[n, i]
+            else:
+                a_new[n, i] = a[n, i]
+                held += 0.5 * (old[n, i] + f) * du[n, i]
+            square += v[n, i] * v[n, i]
+        kinetic += 0.5 * mass[n] * square
+    return work + held, held, kinetic, swing
