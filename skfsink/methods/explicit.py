@@ -33,7 +33,7 @@ from ..fields.deletion import delete_failed, left_in
 from ..fields.density import Density
 from ..fields.state import State
 from .controls import EventControls, ExplicitControls
-from .nodal_steps import half_square, kick, move
+from .nodal_steps import half_square, kick, move, viscous_work
 from .step_length import StepLength
 
 __all__ = ["Explicit"]
@@ -172,8 +172,8 @@ class Explicit:
         present, initial = elastic + pressed + kinetic, ledger.initial
         energy = max(abs(initial), present, self.body.least_energy)
         if viscous is not None:
-            viscous_work = self._viscous_work((viscous, new_viscous), (-self.mass[:, None] * state.a, force), du, dt)
-            energy_fed_in += viscous_work
+            work = viscous_work((viscous, new_viscous), (-self.mass[:, None] * state.a, force), self._inverse, du, dt)
+            energy_fed_in += work
         if dead is not None:
             initial = max(abs(initial), present)
         if not self.length.accepts(energy_fed_in, energy, initial):
@@ -189,7 +189,7 @@ class Explicit:
         if viscous is not None:
             self._viscous, self._spare_viscous = new_viscous, viscous
             self._compression = self.momentum.compression
-            ledger.viscous += viscous_work
+            ledger.viscous += work
         ledger.numerical -= energy_fed_in
         ledger.work += held
         ledger.elastic = self._elastic = elastic
@@ -199,13 +199,6 @@ class Explicit:
         state.grip = grip
         state.step += 1
         return True
-
-    def _viscous_work(self, viscous: tuple[np.ndarray, np.ndarray], force: tuple[np.ndarray, np.ndarray],
-                      du: np.ndarray, dt: float) -> float:
-        """What of the identity of a step is not of internal forces alone; viscous and whole forces before and after."""
-        (old, new), (F0, F1) = viscous, force
-        swing = new * (2 * F1 - new) - old * (2 * F0 - old)
-        return 0.5 * float(np.vdot(old + new, du)) - dt * dt / 8 * float(np.vdot(self._inverse, swing))
 
     def _give_up(self, state: State) -> None:
         """The step that was tried last left its velocities in `_next`."""
@@ -245,7 +238,7 @@ class Explicit:
         mass = self.mass
         self._set_mass()
         if self._viscous is not None:
-            self._viscous *= (self.mass / mass)[:, None]  # as the inertia, of kept accelerations
+            self._viscous *= np.divide(self.mass, mass, out=np.zeros_like(mass), where=mass > 0.0)[:, None]  # as inertia
         ledger.sink_stored += stored - left
         ledger.deletion += left
         half_v2 = half_square(state.v)
@@ -271,6 +264,8 @@ class Explicit:
         if contact is None:
             return
         self.reaction[contact.massless] = 0.0
+        if self._viscous is not None:
+            self._viscous[contact.massless] = 0.0
         before, self._pressed = self._pressed, contact.renew(state.u)
         state.ledger.deletion += before - self._pressed
         state.ledger.contact = self._pressed

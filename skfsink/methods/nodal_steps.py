@@ -6,7 +6,7 @@ import numpy as np
 
 from ..system.jit import njit
 
-__all__ = ["half_square", "kick", "move"]
+__all__ = ["half_square", "kick", "move", "viscous_work"]
 
 
 def half_square(v: np.ndarray) -> np.ndarray:
@@ -56,3 +56,11 @@ def kick(motion, inverse, mass, forces, du, dt):  # type: ignore[no-untyped-def]
             square += v[n, i] * v[n, i]
         kinetic += 0.5 * mass[n] * square
     return work + held, held, kinetic, swing
+
+
+def viscous_work(viscous: tuple[np.ndarray, np.ndarray], forces: tuple[np.ndarray, np.ndarray], inverse: np.ndarray,
+                 du: np.ndarray, dt: float) -> float:
+    """What of the identity of a step is not of internal forces alone; viscous and whole forces before and after."""
+    (old, new), (whole_old, whole_new) = viscous, forces
+    swing = new * (2 * whole_new - new) - old * (2 * whole_old - old)
+    return 0.5 * float(np.vdot(old + new, du)) - dt * dt / 8 * float(np.vdot(inverse, swing))
