@@ -238,7 +238,8 @@ class Explicit:
         mass = self.mass
         self._set_mass()
         if self._viscous is not None:
-            self._viscous *= np.divide(self.mass, mass, out=np.zeros_like(mass), where=mass > 0.0)[:, None]  # as inertia
+            ratio = np.divide(self.mass, mass, out=np.zeros_like(mass), where=mass > 0.0)
+            self._viscous *= ratio[:, None]  # as the inertia, of kept accelerations
         ledger.sink_stored += stored - left
         ledger.deletion += left
         half_v2 = half_square(state.v)
