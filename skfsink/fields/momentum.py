@@ -24,8 +24,8 @@ class Momentum:
     """Internal force and its derivatives (Eq. 14-19, 28) for the relative density last given.
 
     Memory: the density last given to `set_gamma` and the load time last given to `set_time`: `force`, `tangent`,
-    `stiffest`, `viscous_force`, `lumped_mass` and `consistent_mass` are for these. `potential`, `W`, `energy` and
-    `pressed` are of the last `force`, `compression` of the last `viscous_force`. `contact` is set once.
+    `stiffest`, `viscous_force`, `viscous_tangent`, `lumped_mass` and `consistent_mass` are for these. `potential`, `W`,
+    `energy` and `pressed` are of the last `force`, `compression` of the last `viscous_force`. `contact` is set once.
 
     Parameters
     ----------
