@@ -55,7 +55,8 @@ class _Rejected(Exception):
 class Trial:
     """A step from an accepted state, `dt` [s] long, to the load time `end` [s].
 
-    Memory: all of it: `predict`, then `iterate`. The state is not changed; the momentum balance is left at the trial.
+    Memory: all of it: `predict`, then `iterate`, and `velocity` of the last of these. The state is not changed; the
+    momentum balance is left at the trial.
 
     Attributes
     ----------
