@@ -75,7 +75,7 @@ def test_what_is_no_quantity(text: str, unit: str, said: str) -> None:
 def test_every_length_time_and_stress_has_a_unit(case: str) -> None:
     """Fails if a parameter whose help names a unit has none in a deck, or another one."""
     for name, parameter in find_case(case).parameters.items():
-        said = re.findall(r"\[([A-Za-z/^0-9]*[A-Za-z][A-Za-z/^0-9]*)\]", parameter.meaning)
+        said = re.findall(r"\[([A-Za-z/^0-9 ]*[A-Za-z][A-Za-z/^0-9 ]*)\]", parameter.meaning)
         assert said == ([parameter.unit] if parameter.unit else []), (name, parameter)
     deck = deck_text(case)
     for name, unit in (("length_scale", "mm"), ("density", "kg/m^3"), ("speed", "mm/s"), ("phi", "MPa"),
