@@ -198,7 +198,8 @@ def test_engineering_constants_of_aaa() -> None:
 def test_engineering_constants_of_the_command() -> None:
     """Fails if `skfsink material` takes other names than decks do."""
     status, err, out = invoke_program("material", "gent", "--E", "1.2", "--nu", "0.45", "--density", "1000")
-    assert (status, err) == (0, "") and "bulk_modulus 4, density 1000, viscosity 0, mu 0.413793" in " ".join(out.split())
+    assert (status, err) == (0, "")
+    assert "bulk_modulus 4, density 1000, viscosity 0, mu 0.413793" in " ".join(out.split())
     status, err, _ = invoke_program("material", "gent", "--nu", "0.45", "--bulk-modulus", "4")
     assert status == 2 and "say the same" in err and err.count("\n") == 1
     assert "bulk_modulus 4," in invoke_program("material", "gent", "--G", "1", "--bulk-modulus", "4")[2]
