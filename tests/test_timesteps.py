@@ -19,7 +19,7 @@ from skfsink.methods.explicit import Explicit
 from skfsink.methods.hht import HHT
 
 MAKERS: dict[str, Callable] = {
-    "explicit": lambda *args: Explicit(held_body(*args), ExplicitControls(gamma_every=4)),
+    "explicit": lambda *args: Explicit(held_body(*args), ExplicitControls(gamma_every=4, energy_tolerance=0.0)),
     "explicit, interval of gamma by itself": lambda *args: Explicit(held_body(*args)),
     "explicit, steps rejected": lambda *args: Explicit(held_body(*args), ExplicitControls(energy_tolerance=2e-6)),
     "hht": lambda *args: HHT(held_body(*args), HHTControls(dt=2e-7)),
@@ -42,7 +42,7 @@ def test_run_continues_to_the_same_bits(fracture: Fracture, name: str, before: i
     for _ in range(before):
         one.step(state)
     one.sync(state)
-    assert (one.rejected > 0) == (name == "explicit, steps rejected") or "hht" in name
+    assert one.rejected > 0 if name == "explicit, steps rejected" else name != "explicit" or one.rejected == 0
     saved = copy.deepcopy((state, one.memory()))
     for _ in range(40):
         one.step(state)
