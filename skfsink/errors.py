@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 __all__ = ["CheckpointError", "ConvergenceError", "InstabilityError", "Interrupted", "MeshError", "MissingExtra",
-           "OutputError", "ParameterError", "SkfsinkError", "first_line", "place_text", "require"]
+           "OutputError", "ParameterError", "SkfsinkError", "choose", "first_line", "place_text", "require"]
 
 
 class SkfsinkError(Exception):
@@ -43,6 +43,19 @@ class Interrupted(SkfsinkError):
 
 class InstabilityError(SkfsinkError):
     """The energy ledger, or a field, shows that a computed result can no longer be trusted."""
+
+
+def choose(name: str, value: str, allowed: Collection[str]) -> str:
+    """Return `value` if it is one of the words allowed for `name`.
+
+    Raises
+    ------
+    ParameterError
+        It is none of them; the line lists those there are.
+    """
+    if value not in allowed:
+        raise ParameterError(f"{name} must be one of {', '.join(allowed)}; got {value!r}")
+    return value
 
 
 def require(name: str, value: float, unit: str = "", *, low: float = -math.inf, high: float = math.inf,

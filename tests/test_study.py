@@ -55,6 +55,15 @@ def test_a_stopped_study_goes_on_where_it_was(tmp_path: Path):
     assert not Store(path, "a study", fresh=True).points
 
 
+def test_the_command_of_a_study_has_no_place_of_a_machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fails if a published file tells where somebody wrote it, or leaves out what was asked for."""
+    path, study = tmp_path / "study.json", ["python3", "-m", "skfsink.study.stability", "--only", "strength"]
+    for place in (["--out", str(tmp_path)], [f"--out={tmp_path}"]):
+        monkeypatch.setattr(sys, "orig_argv", [*study, *place, "--quiet"])
+        Store(path, "stability", fresh=True).save()
+        assert json.loads(path.read_text())["command"] == "python -m skfsink.study.stability --only strength"
+
+
 @pytest.mark.parametrize("error", [ConvergenceError, InstabilityError])
 def test_a_failing_point_is_a_point(tmp_path: Path, error: type[Exception]):
     """Fails if a run that does not converge is dropped, or stops the study, or is run again."""

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
+from ..errors import choose
 from ..loads.grips import Grip
 from ..meshing.shapes import check_plate
 from ..results.result import Result
 from ..run.compute import run_case
 from ..scene.arrange import arrange
 from ..scene.case import Case
-from ..scene.controls import choose
 from ..scene.options import SAMPLE, Options
 from ..scene.scene import Scene
 from ..units import Unit

@@ -5,7 +5,7 @@ A form that is to be tried is an entry more: `BACKENDS["mine"] = BACKENDS["forms
 
 from __future__ import annotations
 
-from ..errors import ParameterError
+from ..errors import choose
 from .assembled import AssembledDensity, AssembledMomentum, check_size
 from .backend import Backend
 from .compiled import CompiledDensity, CompiledMomentum
@@ -26,6 +26,4 @@ def backend(name: str) -> Backend:
     ParameterError
         There is none.
     """
-    if name not in BACKENDS:
-        raise ParameterError(f"kernels must be one of {', '.join(BACKENDS)}; got {name!r}")
-    return BACKENDS[name]
+    return BACKENDS[choose("kernels", name, BACKENDS)]

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple
 
-from ..errors import ParameterError
+from ..errors import ParameterError, choose
 from ..material import Material
 from .forms import MomentumForms, momentum_forms, plane_stress_forms
 from .space import Space
@@ -48,9 +48,7 @@ def check_element(name: str, space: Space, kernels: str = "compiled") -> Element
     ParameterError
         There is none, it is not made for the dimension, or has no compiled loops.
     """
-    if name not in ELEMENTS:
-        raise ParameterError(f"element must be one of {', '.join(ELEMENTS)}; got {name!r}")
-    element = ELEMENTS[name]
+    element = ELEMENTS[choose("element", name, ELEMENTS)]
     if space.dim not in element.dimensions:
         cells = ("quadrilaterals", "hexahedra") if space.dim == 3 else ("hexahedra", "quadrilaterals")
         raise ParameterError(f"element {name} is for meshes of {cells[0]}; this one has {cells[1]}: take jbar")

@@ -14,6 +14,7 @@ import numpy as np
 from ..fem.backend import Part
 from ..fem.space import Space
 from ..system.jit import njit
+from .energy import Ledger
 from .lips import Followers, Weights, facing
 from .medium import Law, Strips, depth, missing, pulls, push, stiffest
 
@@ -25,7 +26,7 @@ class Contact:
 
     Memory: the medium, its tangents, the nodes that follow and their interpolation are of the last `update`, and
     `follow`, `place`, `stiffest` and `tangent` with them; `energy` is of the last `add_force`, `evaluate`, `renew` or
-    `restore`; `rest` is of all `renew` so far, and belongs into a checkpoint.
+    `restore`, and `book` goes on from it; `rest` is of all `renew` so far, and belongs into a checkpoint.
 
     Parameters
     ----------
@@ -164,6 +165,11 @@ class Contact:
             kept = depth(self._energies[medium] / (self._law.modulus[medium] * self.space.V[medium]), self._law.n)
             self.rest[medium] *= (J_bar + kept) / (J_bar + d)
         return self.evaluate(placed)
+
+    def book(self, ledger: Ledger, u: np.ndarray) -> None:
+        """Let it :meth:`renew` at the displacement `u` after the density has fallen, and book what it loses."""
+        before, ledger.contact = self.energy, self.renew(u)
+        ledger.deletion += before - ledger.contact
 
     def restore(self, rest: np.ndarray, placed: np.ndarray) -> float:
         """Energy at the displacement `placed` with the `rest` of a checkpoint."""

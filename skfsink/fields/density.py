@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.sparse import csr_array
 
-from ..errors import ConvergenceError, ParameterError
+from ..errors import ConvergenceError, choose
 from ..fem.amg import AmgCG
 from ..fem.backends import backend
 from ..fem.direct import Factorization
@@ -84,9 +84,8 @@ class DensitySolver:
     def __init__(self, space: Space, law: SinkLaw, sink: str = "lumped", *, tolerance: float = 1e-8,
                  unchanged: float = 1e-12, active_zone: bool = True, regions: Sequence[Region] = (),
                  kernels: str = "compiled", gradient: str = "monotone") -> None:
-        for name, value, allowed in (("sink", sink, SINKS), ("gradient", gradient, GRADIENTS)):
-            if value not in allowed:
-                raise ParameterError(f"{name} must be one of {', '.join(allowed)}; got {value!r}")
+        choose("sink", sink, SINKS)
+        choose("gradient", gradient, GRADIENTS)
         self.space, self.law, self.sink, self._quadrature = space, law, sink, SINKS[sink]
         self.unchanged = unchanged
         check_lengths(law, regions)

@@ -22,6 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..fem.kernels.cofactor import cofactor
 from ..fem.space import Space
 from ..system.jit import njit
 
@@ -137,24 +138,20 @@ def _lip(x, nodes, slopes, tangents, sides, turn):  # type: ignore[no-untyped-de
 
 @njit(cache=True)
 def _gradient(x, nodes, slopes, F):  # type: ignore[no-untyped-def]
-    """F at a Gauss point from the positions of the nodes and the `slopes` of shape functions; returns J."""
+    """F at a Gauss point from the positions of the nodes and the `slopes` of shape functions."""
     dim = x.shape[1]
     F[...] = 0.0
     for a in range(nodes.size):
         for i in range(dim):
             for k in range(dim):
                 F[i, k] += x[nodes[a], i] * slopes[a, k]
-    if dim == 2:
-        return F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]
-    return (F[0, 0] * (F[1, 1] * F[2, 2] - F[1, 2] * F[2, 1]) - F[0, 1] * (F[1, 0] * F[2, 2] - F[1, 2] * F[2, 0])
-            + F[0, 2] * (F[1, 0] * F[2, 1] - F[1, 1] * F[2, 0]))
 
 
 @njit(cache=True)
 def missing(x, strips, law, medium, out):  # type: ignore[no-untyped-def]
     """d, J_bar and energy of the elements `medium` at the positions `x` (n, dim), into `out` (3, medium)."""
     dim = x.shape[1]
-    F = np.empty((dim, dim))
+    F, C = np.empty((dim, dim)), np.empty((dim, dim))
     sides, turn = np.empty((dim - 1, dim)), np.empty((dim - 1, dim))
     for m in range(medium.size):
         e = medium[m]
@@ -164,7 +161,8 @@ def missing(x, strips, law, medium, out):  # type: ignore[no-untyped-def]
             volume = 0.5 * ((x[d, 0] - x[a, 0]) * (x[c, 1] - x[b, 1]) - (x[d, 1] - x[a, 1]) * (x[c, 0] - x[b, 0]))
         else:
             for q in range(strips.w.shape[1]):
-                volume += strips.w[e, q] * _gradient(x, nodes, strips.dN[e, q], F)
+                _gradient(x, nodes, strips.dN[e, q], F)
+                volume += strips.w[e, q] * cofactor(F, C)
         lip = _lip(x, nodes, strips.slopes[e], law.tangents[e], sides, turn)
         out[1, m] = volume / size
         out[0, m] = law.rest[e] * (1.0 + law.sure[e] * (_capped(lip)[0] - 1.0)) - out[1, m]
@@ -172,9 +170,15 @@ def missing(x, strips, law, medium, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def _work(dim):  # type: ignore[no-untyped-def]
+    """Scratch of `_pull`: F and its cofactors, (dim, dim); sides and turn of :func:`_lip`, (dim-1, dim)."""
+    return np.empty((dim, dim)), np.empty((dim, dim)), np.empty((dim - 1, dim)), np.empty((dim - 1, dim))
+
+
+@njit(cache=True)
 def _pull(x, strips, law, e, work, out):  # type: ignore[no-untyped-def]
-    """V dd/du of an element into `out` (na, dim); `work` is (dim, dim) and two (dim-1, dim). Returns a."""
-    F, sides, turn = work
+    """V dd/du of an element into `out` (na, dim); `work` is that of `_work`. Returns a."""
+    F, C, sides, turn = work
     dim, nodes, size = x.shape[1], strips.conn[e], strips.w[e].sum()
     lip = _lip(x, nodes, strips.slopes[e], law.tangents[e], sides, turn)
     share = size * law.rest[e] * law.sure[e] * _capped(lip)[1]
@@ -188,15 +192,11 @@ def _pull(x, strips, law, e, work, out):  # type: ignore[no-untyped-def]
                 out[n, i] += share * along * turn[t, i]
     for q in range(strips.w.shape[1]):
         _gradient(x, nodes, strips.dN[e, q], F)
+        cofactor(F, C)
         for i in range(dim):
             for k in range(dim):
-                if dim == 2:
-                    cofactor = F[1 - i, 1 - k] if i == k else -F[1 - i, 1 - k]
-                else:
-                    i1, i2, k1, k2 = (i + 1) % 3, (i + 2) % 3, (k + 1) % 3, (k + 2) % 3
-                    cofactor = F[i1, k1] * F[i2, k2] - F[i1, k2] * F[i2, k1]
                 for n in range(nodes.size):
-                    out[n, i] -= strips.w[e, q] * cofactor * strips.dN[e, q, n, k]
+                    out[n, i] -= strips.w[e, q] * C[i, k] * strips.dN[e, q, n, k]
     return lip
 
 
@@ -204,7 +204,7 @@ def _pull(x, strips, law, e, work, out):  # type: ignore[no-untyped-def]
 def push(x, strips, law, medium, d, out):  # type: ignore[no-untyped-def]
     """Add the derivative of the energy of the elements `medium`, with `d` of :func:`missing`, to `out` (n, dim)."""
     dim = x.shape[1]
-    work = np.empty((dim, dim)), np.empty((dim - 1, dim)), np.empty((dim - 1, dim))
+    work = _work(dim)
     pull = np.empty((strips.conn.shape[1], dim))
     for m in range(medium.size):
         if d[m] <= 0.0:
@@ -221,7 +221,7 @@ def push(x, strips, law, medium, d, out):  # type: ignore[no-untyped-def]
 def pulls(x, strips, law, pressed, d, out):  # type: ignore[no-untyped-def]
     """V dd/du of the elements `pressed`, times the root of mu psi''/V, into `out` (pressed, na, dim)."""
     dim = x.shape[1]
-    work = np.empty((dim, dim)), np.empty((dim - 1, dim)), np.empty((dim - 1, dim))
+    work = _work(dim)
     for m in range(pressed.size):
         e = pressed[m]
         _pull(x, strips, law, e, work, out[m])
@@ -235,7 +235,7 @@ def stiffest(x, strips, law, medium, d, inverse_mass):  # type: ignore[no-untype
     The part of psi'' and, bounded by the traces of the second derivatives of J_bar and of a, that of psi'.
     """
     dim = x.shape[1]
-    work = np.empty((dim, dim)), np.empty((dim - 1, dim)), np.empty((dim - 1, dim))
+    work = _work(dim)
     pull = np.empty((strips.conn.shape[1], dim))
     greatest = 0.0
     for m in range(medium.size):
@@ -243,7 +243,7 @@ def stiffest(x, strips, law, medium, d, inverse_mass):  # type: ignore[no-untype
             continue
         e = medium[m]
         lip, size = _pull(x, strips, law, e, work, pull), strips.w[e].sum()
-        sides = work[1]
+        sides = work[2]
         _, pressure, curvature = psi(d[m], law.n)
         bent, longest = law.sure[e] * law.rest[e] * _capped(lip)[1] / max(lip, 1e-3), 1.0
         if dim == 3:

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
 
-from ..errors import ParameterError, require
+from ..errors import ParameterError, choose, require
 from ..units import in_unit
 from .base import Material
 from .library import MATERIALS, material_from
@@ -135,7 +135,6 @@ def material_of(law: str, constants: str, bulk_modulus: float, density: float, v
     ParameterError
         There is no such law or constant, or a value is outside its range.
     """
-    if law not in MATERIALS:
-        raise ParameterError(f"material must be one of {', '.join(MATERIALS)}; got {law!r}")
+    choose("material", law, MATERIALS)
     return material_from(law, {"bulk_modulus": bulk_modulus, "density": density, "viscosity": viscosity,
                                **read_constants(law, constants)})

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
-from ..errors import ParameterError
+from ..errors import ParameterError, choose
 from .base import Material
 from .fibres import HolzapfelGasserOgden
 from .general import MooneyRivlin
@@ -64,8 +64,7 @@ def material_from(name: str, constants: Mapping[str, Any] | None = None) -> Mate
     ParameterError
         The name or a constant is unknown (the message lists those there are), or a value is outside its range.
     """
-    if name not in MATERIALS:
-        raise ParameterError(f"material must be one of {', '.join(MATERIALS)}; got {name!r}")
+    choose("material", name, MATERIALS)
     kind, values = MATERIALS[name], dict(constants or {})
     allowed = [field.name for field in fields(kind)]
     for constant in values:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-from ..errors import ParameterError, require
+from ..errors import choose, require
 
 __all__ = ["COUPLINGS", "MASSES", "EventControls", "ExplicitControls", "HHTControls", "StaticsControls"]
 
@@ -88,10 +88,8 @@ class HHTControls:
         require("gain_tolerance", self.gain_tolerance, low=0, high=1, low_open=True)
         require("max_iterations", self.max_iterations, low=3, whole=True)
         require("mass_floor", self.mass_floor, low=0, high=1, high_open=True)
-        if self.coupling not in COUPLINGS:
-            raise ParameterError(f"coupling must be one of {', '.join(COUPLINGS)}; got {self.coupling!r}")
-        if self.mass not in MASSES:
-            raise ParameterError(f"mass must be one of {', '.join(MASSES)}; got {self.mass!r}")
+        choose("coupling", self.coupling, COUPLINGS)
+        choose("mass", self.mass, MASSES)
 
     @property
     def beta(self) -> float:

@@ -202,7 +202,7 @@ class Explicit:
 
     def _give_up(self, state: State) -> None:
         """The step that was tried last left its velocities in `_next`."""
-        if self.controls.energy_tolerance == 0.0:
+        if not self.length.rejects:
             raise InstabilityError(
                 f"the explicit integration blew up at t = {state.time:.4g} s (step {state.step}): lower courant, now "
                 f"{self.controls.courant:g}, or reject such steps by an energy_tolerance of "
@@ -267,9 +267,8 @@ class Explicit:
         self.reaction[contact.massless] = 0.0
         if self._viscous is not None:
             self._viscous[contact.massless] = 0.0
-        before, self._pressed = self._pressed, contact.renew(state.u)
-        state.ledger.deletion += before - self._pressed
-        state.ledger.contact = self._pressed
+        contact.book(state.ledger, state.u)
+        self._pressed = contact.energy
 
     @property
     def _gamma_every(self) -> int:

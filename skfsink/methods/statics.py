@@ -88,9 +88,8 @@ class Statics(StaticLoading):
             ledger.drop(self.space.w, W, old, undeleted)
             ledger.deletion += float(np.einsum("eq,eq,eq->", self.space.w, W, undeleted - self.momentum.gamma))
             ledger.elastic = float(np.einsum("eq,eq,eq->", self.space.w, W, self.momentum.gamma))
-            if (contact := self.momentum.contact) is not None:
-                pressed, ledger.contact = contact.energy, contact.renew(state.u)
-                ledger.deletion += pressed - ledger.contact
+            if self.momentum.contact is not None:
+                self.momentum.contact.book(ledger, state.u)
             self.settled = change <= self.controls.gamma_tolerance and not postponed
             idle = idle + 1 if postponed and change <= self.controls.gamma_tolerance else 0
             if idle > self.IDLE:

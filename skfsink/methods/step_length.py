@@ -23,7 +23,8 @@ class StepLength:
     """The length of the next step of one integration.
 
     Memory: estimate of the limit and its mode, indicator, cuts, calm steps: `look`, `share`, `accepts` and
-    `is_given_up` go on from the body last looked at and the steps last tried; `memory` gives what a checkpoint needs.
+    `is_given_up` go on from the body last looked at and the steps last tried, `rejects` from `fix`; `memory` gives what
+    a checkpoint needs.
 
     Parameters
     ----------
@@ -117,7 +118,7 @@ class StepLength:
 
         `initial` is the energy at the start, in which the error is measured where no step is rejected.
         """
-        if not self._rejects:
+        if not self.rejects:
             self.urgent = self.urgent or error > self.FED_IN * initial
             return bool(np.isfinite(error))
         if not (abs(error) <= self.controls.energy_tolerance * energy and np.isfinite(error)):
@@ -136,10 +137,11 @@ class StepLength:
     @property
     def is_given_up(self) -> bool:
         """Whether a step that was not accepted is the end: the shortest one, or any where none is rejected."""
-        return self.cut > self.CUTS or not self._rejects
+        return self.cut > self.CUTS or not self.rejects
 
     @property
-    def _rejects(self) -> bool:
+    def rejects(self) -> bool:
+        """Whether steps that do not keep the energy are made again."""
         return self.controls.energy_tolerance > 0.0 and not self.fixed
 
     # --- checkpoints ---

@@ -16,7 +16,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from PIL import Image
 
-from ..errors import OutputError, ParameterError
+from ..errors import OutputError, choose
 from ..results.frame import Frame, frame_file, read_frame
 from ..results.loader import Run
 from ..system.files import replaced
@@ -100,8 +100,7 @@ def _frames(run: Run, numbers: Sequence[int]) -> list[Frame]:
 @matplotlib.rc_context(STYLE)
 def _pictures(run: Run, frames: Sequence[Frame], field: str, width: int, view: View | None) -> list[Image.Image]:
     """The frames, all at one scale and in one range of colours."""
-    if field not in FIELDS:
-        raise ParameterError(f"field must be one of {', '.join(FIELDS)}; got {field!r}")
+    choose("field", field, FIELDS)
     space, camera = run.scene.sample.space, camera_of(view or run.scene.view)
     box = bounds(space, frames, camera)
     largest = 1.0 if field == "gamma" else fastest(frames)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numba
 
-from ..errors import ParameterError, require
+from ..errors import ParameterError, choose, require
 from ..fem.backends import backend
 from ..fem.elements import ELEMENTS
 from ..fields.density import GRADIENTS
@@ -15,17 +15,10 @@ from ..fields.sinks import SINKS
 from ..methods.controls import ExplicitControls, HHTControls, StaticsControls
 from ..methods.integrators import INTEGRATORS
 
-__all__ = ["ANALYSES", "STARTS", "Controls", "choose"]
+__all__ = ["ANALYSES", "STARTS", "Controls"]
 
 ANALYSES = ("dynamic", "quasistatic", "both")
 STARTS = ("onset", "rest")
-
-
-def choose(name: str, value: str, allowed: tuple[str, ...]) -> str:
-    """Return `value` if it is one of the words allowed for `name`."""
-    if value not in allowed:
-        raise ParameterError(f"{name} must be one of {', '.join(allowed)}; got {value!r}")
-    return value
 
 
 @dataclass(frozen=True)
@@ -84,7 +77,7 @@ class Controls:
 
     def __post_init__(self) -> None:
         choose("analysis", self.analysis, ANALYSES)
-        choose("integrator", self.integrator, tuple(INTEGRATORS))
+        choose("integrator", self.integrator, INTEGRATORS)
         choose("start", self.start, STARTS)
         if self.start == "rest" and self.analysis != "dynamic":
             raise ParameterError(f"start rest is for analysis dynamic; got {self.analysis}")
@@ -94,9 +87,9 @@ class Controls:
         if self.contact and self.element == "planestress":
             raise ParameterError("contact is for elements jbar and plain; got planestress: the lips of a thin sheet "
                                  "buckle out of it")
-        choose("sink", self.sink, tuple(SINKS))
+        choose("sink", self.sink, SINKS)
         choose("gradient", self.gradient, GRADIENTS)
-        choose("element", self.element, tuple(ELEMENTS))
+        choose("element", self.element, ELEMENTS)
         backend(self.kernels)
         require("overshoot", self.overshoot, low=0, high=0.1, low_open=True)
         require("deletion", self.deletion, low=0, high=1e-2, low_open=True)

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 from cyclopts import Group, Parameter, Token
 
-from ..errors import ParameterError, require
+from ..errors import ParameterError, choose, require
 from ..material import (
     AAA,
     MATERIALS,
@@ -25,7 +25,7 @@ from ..material import (
 from ..methods.controls import ExplicitControls, HHTControls, StaticsControls
 from ..system.files import path_of
 from ..units import Unit
-from .controls import Controls, choose
+from .controls import Controls
 from .schedule import check_observers
 
 __all__ = ["LAYOUTS", "NOT_PHYSICS", "OUTSIDE_A_DECK", "QUANTITIES", "SAMPLE", "Options"]

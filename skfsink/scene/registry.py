@@ -12,7 +12,7 @@ import pkgutil
 from dataclasses import replace
 from pathlib import Path
 
-from ..errors import OutputError, ParameterError
+from ..errors import OutputError, choose
 from ..system.files import path_of
 from .case import Case
 from .options import Options
@@ -34,8 +34,7 @@ def find_case(name: str) -> Case:
     ParameterError
         There is none.
     """
-    if name not in CASES:
-        raise ParameterError(f"case must be one of {', '.join(CASES)}; got {name!r}")
+    choose("case", name, CASES)
     case: Case = importlib.import_module(f"skfsink.cases.{name}").CASE
     return case
 

@@ -7,7 +7,7 @@ import os
 import shlex
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -86,9 +86,8 @@ class Store:
 
     def save(self) -> None:
         """Write the file."""
-        command = shlex.join(["python", *sys.orig_argv[1:]])
-        write_summary(self.path, {"schema": SCHEMA, "study": self.study, "command": command, "machine": self.machine,
-                                  "points": self.points})
+        write_summary(self.path, {"schema": SCHEMA, "study": self.study, "command": _command(sys.orig_argv[1:]),
+                                  "machine": self.machine, "points": self.points})
 
     def _read(self) -> dict[str, Any]:
         try:
@@ -105,3 +104,10 @@ class Store:
 def _cpu() -> float:
     """Processor time of this process and its ended children [s]."""
     return sum(os.times()[:4])
+
+
+def _command(words: Sequence[str]) -> str:
+    """The command line of a study without what does not change its points: where it writes, and whether it is quiet."""
+    kept = [word for word, before in zip(words, ["", *words])
+            if word not in ("--out", "--quiet") and before != "--out" and not word.startswith("--out=")]
+    return shlex.join(["python", *kept])

@@ -19,6 +19,7 @@ from ...system.jit import njit
 from ..pattern import Pattern
 from ..quadrature import points, shape_functions
 from ..space import Space
+from .cofactor import cofactor
 
 __all__ = ["LEAST_JACOBIAN", "monotone", "monotone_laplacian"]
 
@@ -91,7 +92,7 @@ def _stiffness(x, gradients, least, K):  # type: ignore[no-untyped-def]
             for i in range(dim):
                 for k in range(dim):
                     J[i, k] += x[a, i] * gradients[q, a, k]
-        det = _cofactor(J, C)
+        det = cofactor(J, C)
         if det <= least:
             return False
         for a in range(na):
@@ -106,23 +107,6 @@ def _stiffness(x, gradients, least, K):  # type: ignore[no-untyped-def]
                     total += c[a, i] * c[b, i]
                 K[a, b] += total / (nq * det)
     return True
-
-
-@njit(cache=True)
-def _cofactor(J, C):  # type: ignore[no-untyped-def]
-    """Cofactors of J into C; returns its determinant."""
-    if J.shape[0] == 2:
-        C[0, 0], C[0, 1], C[1, 0], C[1, 1] = J[1, 1], -J[1, 0], -J[0, 1], J[0, 0]
-    else:
-        for i in range(3):
-            m, n = (i + 1) % 3, (i + 2) % 3
-            for k in range(3):
-                r, s = (k + 1) % 3, (k + 2) % 3
-                C[i, k] = J[m, r] * J[n, s] - J[m, s] * J[n, r]
-    det = 0.0
-    for k in range(J.shape[0]):
-        det += J[0, k] * C[0, k]
-    return det
 
 
 @njit(cache=True)

@@ -23,7 +23,7 @@ from ...system.jit import njit
 from ..pattern import Pattern
 from ..space import Space
 from . import force2d, force3d
-from .lanes import FAST, J_FLOOR, LANES, LANES_3D
+from .lanes import FAST, J_FLOOR, LANES, LANES_3D, crush_factor
 from .pieces import pieces
 from .records import Viscous
 from .tangent import _cofactor, parts
@@ -37,7 +37,7 @@ _Q, _Q3 = 4 * LANES, 8 * LANES_3D
 def _inverse(J, sheet, inverse):  # type: ignore[no-untyped-def]
     """1/J_e, of a thin sheet its square."""
     for i in range(J.size):
-        one = 1.0 / (J[i] if J[i] > J_FLOOR else J_FLOOR + 2 / 3.0 * (J_FLOOR - J[i]))
+        one = 1.0 / (J[i] if J[i] > J_FLOOR else J_FLOOR * crush_factor(J[i]))
         inverse[i] = one * one if sheet else one
 
 
@@ -247,7 +247,7 @@ def _make(dim: int) -> Callable[..., Any]:
                 deformation(x, piece, e, q, F)
                 _cofactor(F, C)
                 J = F[0, 0] * C[0, 0] + F[0, 1] * C[0, 1] + F[0, 2] * C[0, 2]
-                J_e = J if J > J_FLOOR else J_FLOOR + 2 / 3.0 * (J_FLOOR - J)
+                J_e = J if J > J_FLOOR else J_FLOOR * crush_factor(J)
                 factor[q] = 2.0 * viscous.eta * w[e, q] * gamma[e, q] * (1.0 if viscous.sheet else J_e)
                 for a in range(na):
                     for i in range(dim):
