@@ -21,8 +21,9 @@ from skfsink.fields.medium import FROM, depth, psi
 from skfsink.fields.momentum import Momentum
 from skfsink.fields.state import State
 from skfsink.material import AAA, SinkLaw
-from skfsink.methods.controls import ExplicitControls
+from skfsink.methods.controls import ExplicitControls, HHTControls
 from skfsink.methods.explicit import Explicit
+from skfsink.methods.hht import HHT
 from skfsink.methods.newton import Newton
 from skfsink.methods.statics import Statics
 from skfsink.results.frame import read_frame
@@ -326,44 +327,47 @@ def bar(speed: float) -> tuple[Body, State]:
     return body, state
 
 
-def test_halves_of_a_bar_collide() -> None:
+@pytest.mark.parametrize(("kind", "drift"), [(Explicit, 1e-10), (HHT, 1e-6)])
+def test_halves_of_a_bar_collide(kind: type[Explicit | HHT], drift: float) -> None:
     """Fails if the halves of a cut bar do not hit each other, or momentum or energy are lost in it.
 
     Seen to fail without the medium (the halves go on), and (at once) with its energy left out of `numerical`.
     """
     body, state = bar(1000.0)
-    explicit, right = Explicit(body), body.space.X[:, 0] > 1.65
-    explicit.begin(state)
-    at_start, initial = explicit.mass @ state.v, state.ledger.kinetic
-    size = float(explicit.mass @ np.abs(state.v[:, 0]))
-    worst = max(abs(state.ledger.balance) for _ in explicit.run(state, 4e-4))
-    explicit.sync(state)
-    assert np.abs(explicit.mass @ state.v - at_start).max() < 1e-10 * size
-    share = float(explicit.mass[right] @ state.v[right, 0]) / size
+    integrator, right = kind(body), body.space.X[:, 0] > 1.65
+    integrator.begin(state)
+    mass, initial = body.momentum.lumped_mass(0.0), state.ledger.kinetic
+    at_start = mass @ state.v
+    size = float(mass @ np.abs(state.v[:, 0]))
+    worst = max(abs(state.ledger.balance) for _ in integrator.run(state, 4e-4))
+    integrator.sync(state)
+    assert np.abs(mass @ state.v - at_start).max() < drift * size
+    share = float(mass[right] @ state.v[right, 0]) / size
     assert share > 0.8  # the half that was at rest has taken most of the momentum
     ledger = state.ledger
-    assert worst < 1e-9 * initial and abs(ledger.numerical) < 0.02 * initial
+    assert worst < drift * initial and abs(ledger.numerical) < 0.02 * initial
     assert ledger.contact < 0.1 * initial and ledger.kinetic > 0.5 * initial
 
 
-def test_resumed_in_contact() -> None:
+@pytest.mark.parametrize("kind", [Explicit, HHT])
+def test_resumed_in_contact(kind: type[Explicit | HHT]) -> None:
     """Fails if a run that goes on from a checkpoint, while lips are pressed, ends with other bits.
 
     Seen to fail with the `rest` of elements left out of the checkpoint.
     """
     body, state = bar(1000.0)
-    explicit = Explicit(body)
-    explicit.begin(state)
+    started = kind(body)
+    started.begin(state)
     contact = body.momentum.contact
     assert contact is not None
     contact.rest[contact.medium[::2]] = 0.9
-    for _ in explicit.run(state, 6e-5):
+    for _ in started.run(state, 6e-5):
         pass
     assert state.ledger.contact > 0.0
-    explicit.sync(state)
-    resumed, other = copy.deepcopy(state), Explicit(bar(1000.0)[0])
-    other.restore(resumed, copy.deepcopy(explicit.memory()))
-    for one, integrator in ((state, explicit), (resumed, other)):
+    started.sync(state)
+    resumed, other = copy.deepcopy(state), kind(bar(1000.0)[0])
+    other.restore(resumed, copy.deepcopy(started.memory()))
+    for one, integrator in ((state, started), (resumed, other)):
         for _ in integrator.run(one, 8e-5):
             pass
         integrator.sync(one)
@@ -403,6 +407,4 @@ def test_contact_is_refused_where_there_is_none() -> None:
     """Fails if an analysis that has no contact takes the option without a word. Seen to fail without the check."""
     with pytest.raises(ParameterError, match=r"contact is for elements jbar and plain; got planestress"):
         Options(contact=True, element="planestress")
-    with pytest.raises(ParameterError, match="contact is for integrator explicit and for analysis quasistatic; got"):
-        Options(contact=True, integrator="hht")
-    Options(contact=True, integrator="hht", analysis="quasistatic")
+    Options(contact=True, integrator="hht")

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ctypes
 import os
+from collections.abc import Callable
 from contextlib import AbstractContextManager
 from typing import Any, NamedTuple
 
@@ -21,7 +22,8 @@ from .pattern import Pattern
 
 os.environ.setdefault("MKL_CBWR", "AUTO,STRICT")  # the same bits from one run to the next, whatever the alignment
 
-__all__ = ["Factorization", "add_symmetric_product", "one_thread_of_openblas", "symmetric_product", "unsigned"]
+__all__ = ["Factorization", "add_symmetric_product", "one_thread_of_openblas", "solve_sum", "symmetric_product",
+           "unsigned"]
 
 try:
     import pypardiso
@@ -158,6 +160,14 @@ class Factorization:
         if kind not in self._handles:
             self._handles[kind] = _Pardiso(self.pattern, kind, self.threads)
         return self._handles[kind]
+
+
+def solve_sum(solve: Callable[[np.ndarray], np.ndarray], B: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Solution of (A + B B^T) x = b by Woodbury's formula; `solve` gives that of A x = b, and B has few columns."""
+    x = solve(b)
+    Z = np.stack([solve(column) for column in B.T], axis=1)
+    small: np.ndarray = np.linalg.solve(np.eye(B.shape[1]) + B.T @ Z, B.T @ x)
+    return x - Z @ small
 
 
 class _Pardiso:

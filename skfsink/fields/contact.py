@@ -182,14 +182,19 @@ class Contact:
         missing(self.space.X + placed, self._strips, self._law, self.medium, found)
         return found
 
-    def tangent(self, u: np.ndarray) -> np.ndarray:
-        """Matrix B (n*dim, m) of the convex part B B^T of the medium's tangent at the displacement `u` (n, dim).
+    def tangent(self, u: np.ndarray) -> np.ndarray | None:
+        """Matrix B (free unknowns, m) of the convex part B B^T of the medium's tangent at the displacement `u` (n, dim).
 
-        A column for each element that is pressed; the other part, of its pressure, is small where that is.
+        A column for each element that is pressed, None if none is; the other part, of its pressure, is small where
+        that is.
         """
+        if not self.medium.size:
+            return None
         placed = self.follow(u)
         d = self._pressed(placed)[0]
         pressed, d = self.medium[d > 0.0], d[d > 0.0]
+        if not pressed.size:
+            return None
         found = np.empty((pressed.size, self.space.conn.shape[1], self.space.dim))
         pulls(self.space.X + placed, self._strips, self._law, pressed, d, found)
         B = np.zeros((pressed.size, *self.space.X.shape))
@@ -197,7 +202,7 @@ class Contact:
             column[nodes] = pull
             for one in self._followers:
                 one.pass_on(column)
-        return B.reshape(pressed.size, -1).T
+        return B.reshape(pressed.size, -1).T[self._free.ravel()]
 
     def stiffest(self, u: np.ndarray) -> float:
         """Bound of the highest frequency squared that the medium adds [1/s^2] at the displacement `u` (n, dim).

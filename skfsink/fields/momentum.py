@@ -113,10 +113,10 @@ class Momentum:
         at_gauss[(at_gauss < self.force_floor) | deleted[:, None]] = 0.0
         return at_gauss
 
-    def set_gamma(self, gamma: np.ndarray, deleted: np.ndarray) -> float:
+    def set_gamma(self, gamma: np.ndarray, deleted: np.ndarray, *, medium: bool = True) -> float:
         """Use the nodal relative density `gamma` (n,) and the `deleted` elements (ne,) from now on.
 
-        Returns the energy [N mm; N mm/mm in 2D] that its fall takes from the stored energy last evaluated.
+        Without `medium` that between the lips of cracks stays what it is, as in a step on trial. Returns the energy [N mm; N mm/mm in 2D] that its fall takes from the stored energy last evaluated.
         """
         self._gamma = None
         if self.dead is not None:
@@ -125,7 +125,8 @@ class Momentum:
         taken = self.backend.relax(gamma, deleted, self.force_floor)
         if self.contact is not None:
             self._mass = self._lumped(self.gamma)
-            self.contact.update(self.gamma, self._mass, self._intact)
+            if medium:
+                self.contact.update(self.gamma, self._mass, self._intact)
         return taken
 
     def set_time(self, t: float) -> None:
@@ -199,15 +200,9 @@ class Momentum:
         return self.backend.mass(pattern, self.gamma)
 
     def lumped_mass(self, floor: float) -> np.ndarray:
-        """Row sums (n,) [t; t/mm in 2D] of Eq. (28), at least `floor` times those of the intact solid.
-
-        With `contact`, nodes that follow the lips have none.
-        """
-        if self.contact is None:
-            return np.maximum(self._lumped(self.gamma), floor * self._intact)
-        mass = np.maximum(self._mass, floor * self._intact)
-        mass[self.contact.massless.any(axis=1)] = 0.0
-        return mass
+        """Row sums (n,) [t; t/mm in 2D] of Eq. (28), at least `floor` times those of the intact solid."""
+        mass = self._lumped(self.gamma) if self.contact is None else self._mass
+        return np.maximum(mass, floor * self._intact)
 
     def _lumped(self, gamma: np.ndarray) -> np.ndarray:
         """Row sums (n,) of the mass matrix."""

@@ -104,8 +104,10 @@ class Explicit:
 
     def _set_mass(self) -> None:
         self.mass = self.momentum.lumped_mass(self._mass_floor)
-        contact = self.momentum.contact
-        self._moving = self._free if contact is None else self._free & ~contact.massless
+        self._moving, contact = self._free, self.momentum.contact
+        if contact is not None:
+            self._moving = self._free & ~contact.massless
+            self.mass[contact.massless.any(axis=1)] = 0.0
         mass = self.mass[:, None]
         self._inverse = np.divide(self._moving, mass, out=np.zeros(self._free.shape), where=mass > 0.0)  # 0 where held
 

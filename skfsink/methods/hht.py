@@ -116,8 +116,9 @@ class HHT:
         state.a.reshape(-1)[self.free] = self.solver.solve(self._now.inertia)
         state.ledger.elastic = self.momentum.energy
         state.ledger.kinetic = self.inertia.kinetic(self._now.mass, state.v)
-        state.ledger.loads = self.momentum.loads
-        state.ledger.initial = state.ledger.elastic + state.ledger.kinetic + state.ledger.loads
+        state.ledger.loads, state.ledger.contact = self.momentum.loads, self.momentum.pressed
+        state.ledger.initial = (state.ledger.elastic + state.ledger.kinetic + state.ledger.loads
+                                + state.ledger.contact)
 
     def run(self, state: State, t_end: float) -> Iterator[State]:
         """Step until `t_end` [s], yielding the state after each accepted step."""
@@ -169,9 +170,15 @@ class HHT:
         ledger.drop(self.space.w, old.W, old.gamma, momentum.gamma)
         places, mass = self.inertia.places(), self.inertia.matrix()
         ledger.sink_kinetic += float(np.vdot(old.places - places, self.inertia.half_v2(state.v)))
+        self._book_contact(state)
         force, viscous = self._forces(state)
         self._now = Balance(force, self.inertia.times(mass, state.a.ravel()[self.free]), momentum.gamma, old.W, mass,
                             places, viscous)
+
+    def _book_contact(self, state: State) -> None:
+        """Book the energy that the medium between lips loses at fixed displacement as density falls."""
+        if self.momentum.contact is not None:
+            self.momentum.contact.book(state.ledger, state.u)
 
     @property
     def _dead_loads(self) -> np.ndarray | None:
@@ -220,6 +227,8 @@ class HHT:
         accelerations = state.a.ravel()[self.free], trial.a.ravel()[self.free]
         motion = book_motion(self.inertia, old, new, accelerations, du.ravel()[self.free], (trial.dt, self.controls))
         motion -= rest
+        stored += self.momentum.pressed - ledger.contact
+        ledger.contact = self.momentum.pressed
         held = float((0.5 * (old.force + new.force) * du)[self._held].sum())
         ledger.numerical += held - stored - motion
         ledger.work += held
@@ -233,8 +242,10 @@ class HHT:
     def _bury(self, state: State, new: Balance) -> None:
         """Delete what has failed in a step; nodes without mass stand still."""
         momentum, ledger = self.momentum, state.ledger
-        if delete_failed(self.space, state, self.body.deletion, self.density.failure_energy).size:
+        failed = delete_failed(self.space, state, self.body.deletion, self.density.failure_energy).size
+        if failed or momentum.contact is not None:
             momentum.set_gamma(state.gamma, state.deleted)
+        if failed:
             self._book_loads(state)
             ledger.deletion += float(np.einsum("eq,eq,eq->", self.space.w, new.gamma - momentum.gamma, new.W))
         mass, places = self.inertia.matrix(), self.inertia.places()
@@ -244,6 +255,7 @@ class HHT:
         state.a[dead] = 0.0
         ledger.kinetic = self.inertia.kinetic(mass, state.v)
         ledger.deletion += moving - ledger.kinetic  # with what the mass floor of dead nodes still had
+        self._book_contact(state)
         force, viscous = self._forces(state)
         ledger.elastic, ledger.loads = momentum.energy, momentum.loads
         self._now = Balance(force, new.inertia, momentum.gamma, momentum.W, mass, places, viscous)
@@ -258,11 +270,15 @@ class HHT:
 
     def memory(self) -> dict[str, np.ndarray]:
         """What the integrator remembers beyond the state, for a checkpoint."""
+        contact = self.momentum.contact
         return {"inertia": self._now.inertia, "rate": self._rate,
+                **({} if contact is None else {"contact_rest": contact.rest}),
                 **{name: np.array(getattr(self, name)) for name in ("dt", "rejected", "iterations")}}
 
     def restore(self, state: State, memory: dict[str, np.ndarray]) -> None:
         """Go on exactly where :meth:`memory` was taken."""
+        if self.momentum.contact is not None:
+            self.momentum.contact.rest[...] = memory["contact_rest"]
         self.start(state)
         self._now = self._now._replace(inertia=memory["inertia"])
         self._rate = memory["rate"]

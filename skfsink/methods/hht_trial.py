@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import ConvergenceError
-from ..fem.direct import Factorization
+from ..fem.direct import Factorization, solve_sum
 from ..fem.indicators import inverted
 from ..fem.pattern import Pattern
 from ..fields.body import Body
@@ -56,7 +56,7 @@ class Trial:
     """A step from an accepted state, `dt` [s] long, to the load time `end` [s].
 
     Memory: all of it: `predict`, then `iterate`, and `velocity` of the last of these. The state is not changed; the
-    momentum balance is left at the trial.
+    momentum balance is left at the trial. The medium between lips is that of the accepted state throughout.
 
     Attributes
     ----------
@@ -85,7 +85,7 @@ class Trial:
         """First guess, with the grips at `grip_velocity` (n, dim) [mm/s]; `rate` is du/dt of the step before."""
         c, dt, state = self.scheme.controls, self.dt, self.state
         self.momentum.set_time(self.end)
-        self.momentum.set_gamma(state.gamma, state.deleted)
+        self.momentum.set_gamma(state.gamma, state.deleted, medium=False)
         self.mass = self.scheme.inertia.matrix()
         base = state.u + dt * state.v + dt * dt * (0.5 - c.beta) * state.a
         if dt <= self.scheme.transit:
@@ -174,7 +174,7 @@ class Trial:
                     rate = scheme.controls.newmark_gamma * self.dt / factor  # dv/du
                     tangent += rate * self.momentum.viscous_tangent(scheme.pattern, self.u, self.velocity)
                 scheme.solver.factorize(self.mass / factor + (1 + scheme.controls.alpha) * tangent)
-            d = scheme.solver.solve(-residual, tolerance=1e-8)
+            d = self._solve(-residual)
         except ConvergenceError:
             raise _Rejected from None
         step = np.zeros_like(self.u)
@@ -182,6 +182,15 @@ class Trial:
         self._correction = float(np.abs(d[live]).max())
         self.u = self.u + step
         self.a = self.a + step / factor  # not from u - base, which cancels at small steps
+
+    def _solve(self, b: np.ndarray) -> np.ndarray:
+        """Solution for the right-hand side `b` with the factors, and with lips that press on each other."""
+        def solve(b: np.ndarray) -> np.ndarray:
+            return self.scheme.solver.solve(b, tolerance=1e-8)
+
+        contact = self.momentum.contact
+        B = None if contact is None else contact.tangent(self.u)
+        return solve(b) if B is None else solve_sum(solve, np.sqrt(1 + self.scheme.controls.alpha) * B, b)
 
     def _couple(self) -> None:
         """The density that follows the displacement."""
@@ -196,5 +205,5 @@ class Trial:
         self._growing = self._growing + 1 if self._change > last else 0
         if self.scheme.to_onset and self._growing >= self.RUNS_AWAY:
             raise _Rejected
-        self.momentum.set_gamma(self.density.gamma, state.deleted)
+        self.momentum.set_gamma(self.density.gamma, state.deleted, medium=False)
         self.mass = self.scheme.inertia.matrix()

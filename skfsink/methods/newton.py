@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import ConvergenceError
-from ..fem.direct import Factorization
+from ..fem.direct import Factorization, solve_sum
 from ..fem.pattern import Pattern
 from ..fields.momentum import Momentum
 
@@ -150,20 +150,11 @@ class Newton:
 
     def _lips(self, u: np.ndarray) -> np.ndarray | None:
         """B, over the free unknowns, of the tangent B B^T of lips that press on each other at `u`; None if none do."""
-        contact = self.momentum.contact
-        if contact is None or not contact.medium.size:
-            return None
-        B = contact.tangent(u)
-        return B[self.free] if B.shape[1] else None
+        return None if self.momentum.contact is None else self.momentum.contact.tangent(u)
 
     def _solve(self, r: np.ndarray, B: np.ndarray | None) -> np.ndarray:
-        """Solution of (K + B B^T) d = -r with the factors of K, by Woodbury's formula; without B of K d = -r."""
-        d = self.solver.apply(-r)
-        if B is None:
-            return d
-        Z = np.stack([self.solver.apply(column) for column in B.T], axis=1)
-        small: np.ndarray = np.linalg.solve(np.eye(B.shape[1]) + B.T @ Z, B.T @ d)
-        return d - Z @ small
+        """Solution of (K + B B^T) d = -r with the factors of K; without B of K d = -r."""
+        return self.solver.apply(-r) if B is None else solve_sum(self.solver.apply, B, -r)
 
     def _factorise(self, u: np.ndarray, data: np.ndarray) -> None:
         """Factors of the tangent at `u`, or of a positive definite matrix like it."""

@@ -45,7 +45,7 @@ class Controls:
         OMP_NUM_THREADS or the machine's cores, at most 4. Runs with the same number agree to the last bit.
     start: of a dynamic analysis, "onset" (statics up to there) or "rest" (see :mod:`.rest`).
     active_zone: explicit steps solve for gamma only where it changes (see :mod:`.active_zone`).
-    contact: the lips of cracks bear on each other (see :mod:`.contact`), in explicit events and quasi-static passes.
+    contact: the lips of cracks bear on each other (see :mod:`.contact`), in events and quasi-static passes.
     kernels: "compiled", or "forms" (scikit-fem forms, for small meshes), or another name in :data:`.BACKENDS`.
     bulk_viscosity_linear, bulk_viscosity_quadratic: coefficients b1 and b2 of the bulk viscosity, [0, 10].
     """
@@ -81,9 +81,6 @@ class Controls:
         choose("start", self.start, STARTS)
         if self.start == "rest" and self.analysis != "dynamic":
             raise ParameterError(f"start rest is for analysis dynamic; got {self.analysis}")
-        if self.contact and self.integrator != "explicit" and self.analysis != "quasistatic":
-            raise ParameterError(f"contact is for integrator explicit and for analysis quasistatic; got integrator "
-                                 f"{self.integrator}")
         if self.contact and self.element == "planestress":
             raise ParameterError("contact is for elements jbar and plain; got planestress: the lips of a thin sheet "
                                  "buckle out of it")
