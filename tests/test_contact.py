@@ -21,7 +21,7 @@ from skfsink.fields.medium import FROM, depth, psi
 from skfsink.fields.momentum import Momentum
 from skfsink.fields.state import State
 from skfsink.material import AAA, SinkLaw
-from skfsink.methods.controls import ExplicitControls, HHTControls
+from skfsink.methods.controls import ExplicitControls
 from skfsink.methods.explicit import Explicit
 from skfsink.methods.hht import HHT
 from skfsink.methods.newton import Newton

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import ctypes
 import os
-from collections.abc import Callable
 from contextlib import AbstractContextManager
 from typing import Any, NamedTuple
 
@@ -22,8 +21,7 @@ from .pattern import Pattern
 
 os.environ.setdefault("MKL_CBWR", "AUTO,STRICT")  # the same bits from one run to the next, whatever the alignment
 
-__all__ = ["Factorization", "add_symmetric_product", "one_thread_of_openblas", "solve_sum", "symmetric_product",
-           "unsigned"]
+__all__ = ["Factorization", "add_symmetric_product", "one_thread_of_openblas", "symmetric_product", "unsigned"]
 
 try:
     import pypardiso
@@ -108,13 +106,23 @@ class Factorization:
         return x
 
     def apply(self, b: np.ndarray) -> np.ndarray:
-        """Forward and backward substitution, the residual not looked at."""
+        """Forward and backward substitution for the right-hand side b, or columns of b; the residual is not looked at.
+        """
         if not b.size:
             return b
         if self.backend == "superlu":
             assert self._lu is not None
             return self._lu.solve(b)
         return self._handle(2 if self.definite else -2).solve(b)
+
+    def solve_sum(self, B: np.ndarray, b: np.ndarray) -> np.ndarray:
+        """Solution of (A + B B^T) x = b, B with few columns, by Woodbury's formula and one step of refinement."""
+        x, Z = self.apply(b), self.apply(B)
+        small = np.linalg.inv(np.eye(B.shape[1]) + B.T @ Z)
+        x -= Z @ (small @ (B.T @ x))
+        r = self.apply(b - self._times(x) - B @ (B.T @ x))
+        refined: np.ndarray = x + r - Z @ (small @ (B.T @ r))
+        return refined
 
     def conjugate(self, data: np.ndarray, b: np.ndarray, tolerance: float, most: int) -> tuple[np.ndarray, int, bool]:
         """Solution of  A x = b  by conjugate gradients, with A = `data` on the pattern and the factors kept.
@@ -162,14 +170,6 @@ class Factorization:
         return self._handles[kind]
 
 
-def solve_sum(solve: Callable[[np.ndarray], np.ndarray], B: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Solution of (A + B B^T) x = b by Woodbury's formula; `solve` gives that of A x = b, and B has few columns."""
-    x = solve(b)
-    Z = np.stack([solve(column) for column in B.T], axis=1)
-    small: np.ndarray = np.linalg.solve(np.eye(B.shape[1]) + B.T @ Z, B.T @ x)
-    return x - Z @ small
-
-
 class _Pardiso:
     """MKL's PARDISO on one pattern: `kind` 2 for positive definite, -2 for indefinite symmetric matrices."""
 
@@ -196,9 +196,10 @@ class _Pardiso:
         return self._call(self.FACTORIZE) == 0
 
     def solve(self, b: np.ndarray) -> np.ndarray:
-        x = np.empty_like(b)
-        self._call(self.SOLVE, np.ascontiguousarray(b), x)
-        return x
+        columns = np.ascontiguousarray(b.T)
+        x = np.empty_like(columns)
+        self._call(self.SOLVE, columns, x)
+        return x.T
 
     def release(self) -> None:
         self._call(self.RELEASE)
@@ -207,6 +208,7 @@ class _Pardiso:
         handle, pattern = self._handle, self._pattern
         b = self._empty if b is None else b
         x = self._empty if x is None else x
+        count = b.shape[0] if b.ndim == 2 else 1  # of right-hand sides
         numbers = [ctypes.byref(ctypes.c_int32(i)) for i in (1, 1, self._kind, phase, pattern.size)]
         index = ctypes.POINTER(ctypes.c_int32)
         error = ctypes.c_int32(0)
@@ -217,7 +219,8 @@ class _Pardiso:
                 handle.pt.ctypes.data_as(ctypes.POINTER(handle._pt_type[0])), *numbers,
                 self._data.ctypes.data_as(ctypes.c_void_p), pattern.indptr.ctypes.data_as(index),
                 pattern.indices.ctypes.data_as(index), handle.perm.ctypes.data_as(index),
-                ctypes.byref(ctypes.c_int32(1)), handle.iparm.ctypes.data_as(index), ctypes.byref(ctypes.c_int32(0)),
+                ctypes.byref(ctypes.c_int32(count)), handle.iparm.ctypes.data_as(index),
+                ctypes.byref(ctypes.c_int32(0)),
                 b.ctypes.data_as(ctypes.c_void_p), x.ctypes.data_as(ctypes.c_void_p), ctypes.byref(error))
         finally:
             handle.libmkl.MKL_Set_Num_Threads_Local(before)

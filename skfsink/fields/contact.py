@@ -53,7 +53,8 @@ class Contact:
         self.rest = np.ones(ne)
         self._strips = Strips.of(space)
         self._law = Law(modulus, self.rest, np.zeros((ne, dim - 1, dim)), np.zeros(ne), 3 if dim == 2 else 2)
-        self._energies = np.zeros(ne)
+        self._energies = np.zeros(0, np.int64), np.zeros(0)  # elements, and what each had at the last one
+        self._force = np.empty_like(space.X)
         self.medium = np.zeros(0, np.int64)
         self.massless = np.zeros(space.X.shape, bool)
         self._moved = np.zeros(0, np.int64)  # numbers of those degrees of freedom
@@ -125,25 +126,24 @@ class Contact:
     # --- energy and force ---
     def evaluate(self, placed: np.ndarray) -> float:
         """Energy at the displacement `placed` (n, dim) [mm], in which nodes follow."""
-        self._sum(self._pressed(placed)[2])
-        return self.energy
+        return self._sum(self._pressed(placed)[2])
 
-    def _sum(self, energy: np.ndarray) -> None:
-        self._energies[...] = 0.0
-        self._energies[self.medium] = energy
-        self.energy = float(energy.sum())
+    def _sum(self, energy: np.ndarray) -> float:
+        self._energies, self.energy = (self.medium, energy), float(energy.sum())
+        return self.energy
 
     def add_force(self, placed: np.ndarray, out: np.ndarray) -> None:
         """Add the force at the displacement `placed`, in which nodes follow, to `out` (n, dim) [N; N/mm in 2D].
 
         Sets `energy`.
         """
-        d, _, energy = self._pressed(placed)
-        self._sum(energy)
-        if self.energy == 0.0:
+        if not self.medium.size:
+            self.energy = 0.0
             return
-        force = np.zeros_like(out)
-        push(self.space.X + placed, self._strips, self._law, self.medium, d, force)
+        found, force = np.empty((3, self.medium.size)), self._force
+        push(self.space.X + placed, self._strips, self._law, self.medium, found, force)
+        if self._sum(found[2]) == 0.0:
+            return
         for one in self._followers:
             one.pass_on(force)
         out += force
@@ -159,10 +159,13 @@ class Contact:
             return self.energy
         self._changed, placed = False, self.place(u)
         d, J_bar, energy = self._pressed(placed)
-        more = energy > self._energies[self.medium]
+        numbers, energies = self._energies
+        had = np.zeros(self.space.n_elements)
+        had[numbers] = energies
+        more = energy > had[self.medium]
         if more.any():
             medium, J_bar, d = self.medium[more], J_bar[more], d[more]
-            kept = depth(self._energies[medium] / (self._law.modulus[medium] * self.space.V[medium]), self._law.n)
+            kept = depth(had[medium] / (self._law.modulus[medium] * self.space.V[medium]), self._law.n)
             self.rest[medium] *= (J_bar + kept) / (J_bar + d)
         return self.evaluate(placed)
 
@@ -183,7 +186,7 @@ class Contact:
         return found
 
     def tangent(self, u: np.ndarray) -> np.ndarray | None:
-        """Matrix B (free unknowns, m) of the convex part B B^T of the medium's tangent at the displacement `u` (n, dim).
+        """Matrix B (free unknowns, m) of the convex part B B^T of the medium's tangent at the displacement u (n, dim).
 
         A column for each element that is pressed, None if none is; the other part, of its pressure, is small where
         that is.

@@ -201,11 +201,14 @@ def _pull(x, strips, law, e, work, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def push(x, strips, law, medium, d, out):  # type: ignore[no-untyped-def]
-    """Add the derivative of the energy of the elements `medium`, with `d` of :func:`missing`, to `out` (n, dim)."""
+def push(x, strips, law, medium, found, out):  # type: ignore[no-untyped-def]
+    """:func:`missing` into `found`, and the derivative of the energy of the elements `medium` into `out` (n, dim)."""
     dim = x.shape[1]
+    missing(x, strips, law, medium, found)
+    d = found[0]
     work = _work(dim)
     pull = np.empty((strips.conn.shape[1], dim))
+    out[...] = 0.0
     for m in range(medium.size):
         if d[m] <= 0.0:
             continue

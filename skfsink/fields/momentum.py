@@ -116,7 +116,8 @@ class Momentum:
     def set_gamma(self, gamma: np.ndarray, deleted: np.ndarray, *, medium: bool = True) -> float:
         """Use the nodal relative density `gamma` (n,) and the `deleted` elements (ne,) from now on.
 
-        Without `medium` that between the lips of cracks stays what it is, as in a step on trial. Returns the energy [N mm; N mm/mm in 2D] that its fall takes from the stored energy last evaluated.
+        Without `medium` that between the lips of cracks stays what it is, as in a step on trial. Returns the energy
+        [N mm; N mm/mm in 2D] that its fall takes from the stored energy last evaluated.
         """
         self._gamma = None
         if self.dead is not None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import ConvergenceError
-from ..fem.direct import Factorization, solve_sum
+from ..fem.direct import Factorization
 from ..fem.indicators import inverted
 from ..fem.pattern import Pattern
 from ..fields.body import Body
@@ -185,12 +185,11 @@ class Trial:
 
     def _solve(self, b: np.ndarray) -> np.ndarray:
         """Solution for the right-hand side `b` with the factors, and with lips that press on each other."""
-        def solve(b: np.ndarray) -> np.ndarray:
-            return self.scheme.solver.solve(b, tolerance=1e-8)
-
-        contact = self.momentum.contact
+        solver, contact = self.scheme.solver, self.momentum.contact
         B = None if contact is None else contact.tangent(self.u)
-        return solve(b) if B is None else solve_sum(solve, np.sqrt(1 + self.scheme.controls.alpha) * B, b)
+        if B is None:
+            return solver.solve(b, tolerance=1e-8)
+        return solver.solve_sum(np.sqrt(1 + self.scheme.controls.alpha) * B, b)
 
     def _couple(self) -> None:
         """The density that follows the displacement."""

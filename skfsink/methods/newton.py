@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import ConvergenceError
-from ..fem.direct import Factorization, solve_sum
+from ..fem.direct import Factorization
 from ..fem.pattern import Pattern
 from ..fields.momentum import Momentum
 
@@ -154,7 +154,7 @@ class Newton:
 
     def _solve(self, r: np.ndarray, B: np.ndarray | None) -> np.ndarray:
         """Solution of (K + B B^T) d = -r with the factors of K; without B of K d = -r."""
-        return self.solver.apply(-r) if B is None else solve_sum(self.solver.apply, B, -r)
+        return self.solver.apply(-r) if B is None else self.solver.solve_sum(B, -r)
 
     def _factorise(self, u: np.ndarray, data: np.ndarray) -> None:
         """Factors of the tangent at `u`, or of a positive definite matrix like it."""
