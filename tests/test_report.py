@@ -21,9 +21,13 @@ import skfsink
 from skfsink.cli.program import command
 from skfsink.cli.report import report
 from skfsink.errors import OutputError
+from skfsink.fields.energy import OPTIONAL_TERMS
 from skfsink.meshing.vtu import write_mesh
+from skfsink.pictures import plot
 from skfsink.report import charts, citation, report_page, write_report
 from skfsink.report.scenes import command_line, run_labels
+from skfsink.report.tables import energy_tables
+from skfsink.results import reference
 from skfsink.results.history import HISTORY_COLUMNS, History
 from skfsink.results.loader import ENERGIES, FIELD_UNITS
 from skfsink.system import shipped
@@ -71,7 +75,7 @@ def test_loaded_results_are_those_in_the_files(folder: Path) -> None:
         crushed = run.frames.frame("end").cell_data["crushed"][0]
         np.testing.assert_array_equal(crushed == 1, np.isnan(run.frames.frame("end").cell_data["von_mises"][0]))
         energy, energies = run.summary["energy"], run.energies
-        assert list(energies) == [name for name, _, _ in ENERGIES if name != "viscous"]
+        assert list(energies) == [name for name, _, _ in ENERGIES if name not in OPTIONAL_TERMS]
         assert energies["U"].arrival == energy["U_paper_at_arrival"] and energies["U"].end == energy["U_paper_final"]
         assert energies["D"].arrival == pytest.approx(energy["D_sink_at_arrival"], rel=1e-14)
         spent = sum(energies[name].end for name in ("elastic", "kinetic", "D", "deletion", "numerical", "released"))
@@ -279,6 +283,29 @@ def test_curves_of_all_runs_are_whole(folder: Path, copy: Path) -> None:
             x, y = line.get_data()
             if len(x) > 2:
                 assert x.max() <= ax.get_xlim()[1] and np.nanmax(y) <= ax.get_ylim()[1], ax.get_ylabel()
+
+
+@pytest.mark.parametrize("term", OPTIONAL_TERMS)
+def test_terms_of_the_ledger_are_shown_where_the_run_has_them(folder: Path, copy: Path, term: str) -> None:
+    """Fails if report, picture or stored reference show a term of the ledger by its value: here it is 0 in the run that
+    has it. Seen to fail with a term of zeros left out of each of the four."""
+    rows = [dict(zip(HISTORY_COLUMNS, values)) for values in zip(*History.load(copy / "history.csv").values())]
+    History(copy / "history.csv", rows, without=set(OPTIONAL_TERMS) - {term})
+    plain, run = skfsink.load(folder / "dynamic"), skfsink.load(copy)
+    assert set(run.energies) - set(plain.energies) == {term} and run.energies[term].end == 0.0
+    meaning = run.energies[term].meaning
+    found = [{row.name: row.cells for row in energy_tables(of, "ab"[:len(of)])[0].rows}
+             for of in ([run], [plain], [plain, run])]
+    assert found[0][meaning] == ("0", "0", "0") and meaning not in found[1] and found[2][meaning] == ("–", "0")
+    labels = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(plot, "_save", lambda figure, *_: labels.append(figure.axes[0].get_legend_handles_labels()[1]))
+        for of in (plain, run):
+            plot.ledger_picture(of.history, "")
+    assert set(labels[1]) - set(labels[0]) == {plot.BANDS[term][0]}
+    for of, there in ((plain, False), (run, True)):
+        target = reference.store(of.folder, copy.parent / f"stored-{there}", ("end",))
+        assert (f"{term}_N_mm_per_mm" in (target / "history.csv").read_text().splitlines()[0]) == there
 
 
 def test_half_of_a_body_says_so(copy: Path) -> None:

@@ -23,6 +23,7 @@ from matplotlib.tri import Triangulation
 from PIL import Image
 
 from ..fem.space import Space
+from ..fields.energy import OPTIONAL_TERMS
 from ..results.frame import Frame
 from ..results.history import Table, history_units
 from ..system.files import replaced, write_atomic
@@ -228,8 +229,9 @@ def ledger_picture(history: History, path: str | Path, title: str = "") -> None:
     figure = Figure((WIDTH, 4.2), layout="constrained")
     ax, low = figure.subplots(2, 1, sharex=True, height_ratios=[4, 1], subplot_kw={"xmargin": 0})
     total = np.zeros(len(time))
+    without = history.without if isinstance(history, Table) else frozenset()
     for name, (meaning, colour) in BANDS.items():
-        if np.any(event[name]):
+        if name not in without and (name in OPTIONAL_TERMS or np.any(event[name])):
             ax.fill_between(time, total, total + event[name], label=meaning, color=colour, linewidth=0)
             total = total + event[name]
     ax.plot(time, total, "k", label="total")

@@ -147,9 +147,8 @@ def energy_tables(runs: Sequence[Run], labels: Sequence[str]) -> list[Table]:
 
     def rows(*keys: str) -> list[Row]:
         units = [run.history.units["elastic"] for run in runs for _ in keys]
-        viscous = any("viscous" in run.energies for run in runs)
         return [_row(meaning, units, [getattr(run.energies.get(name), key, None) for run in runs for key in keys])
-                for name, _, meaning in ENERGIES if viscous or name != "viscous"]  # a run that did not fail has none
+                for name, _, meaning in ENERGIES]  # a run that did not fail has none
 
     if len(runs) == 1:
         return [_table("Energies of the event", tuple(moments.values()), rows(*moments) if runs[0].energies else [])]

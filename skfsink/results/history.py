@@ -46,7 +46,8 @@ HISTORY_COLUMNS: dict[str, Column] = {
     "reaction_N_per_mm": Column("force on a grip along its motion", _FORCE),
     "elastic": Column("gamma-weighted stored energy", _ENERGY),
     "loads": Column("potential of the dead loads", _ENERGY, before=0.0),
-    "contact": Column("energy of the lips of cracks that bear on each other", _ENERGY, before=0.0),
+    "contact": Column("energy of the lips of cracks that bear on each other; only in runs with contact", _ENERGY,
+                      before=0.0),
     "kinetic": Column("gamma-weighted kinetic energy", _ENERGY),
     "work": Column("work of the grips, and of dead loads that change", _ENERGY),
     "sink_stored": Column("stored energy taken by the sink, the first part of D", _ENERGY),
@@ -54,7 +55,7 @@ HISTORY_COLUMNS: dict[str, Column] = {
     "deletion": Column("energy left in elements when they were deleted", _ENERGY),
     "numerical": Column("dissipation of the time integration", _ENERGY),
     "released": Column("energy given up in relaxing to equilibrium", _ENERGY),
-    "viscous": Column("work done against viscosity; only in dynamic runs that have one", _ENERGY, before=0.0),
+    "viscous": Column("work done against viscosity; only in dynamic runs with a viscosity", _ENERGY, before=0.0),
     "U_paper": Column("U of the paper (Eq. 30, 32)", _ENERGY),
     "balance": Column("what the energies fail to add up to", _ENERGY),
     "tip_x_mm": Column("position of the leading tip, undeformed", "mm"),
@@ -111,10 +112,12 @@ class Table(dict[str, np.ndarray]):
     ----------
     dim: dimensions of the body, 2 or 3.
     units: of the columns, by name of `HISTORY_COLUMNS`; "" for a column of a file that this does not have.
+    without: columns that the file does not have; they have a value for files of before, :attr:`Column.before`.
     """
 
-    def __init__(self, columns: Mapping[str, np.ndarray], dim: int) -> None:
+    def __init__(self, columns: Mapping[str, np.ndarray], dim: int, without: Collection[str] = ()) -> None:
         super().__init__(columns)
+        self.without = frozenset(without)
         self.dim, self.units = dim, {**history_units(dim), **dict.fromkeys(columns.keys() - HISTORY_COLUMNS.keys(), "")}
 
     def __missing__(self, name: str) -> np.ndarray:
@@ -139,11 +142,12 @@ class History:
     Attributes
     ----------
     rows: a dictionary with a value for each of `HISTORY_COLUMNS` for every row.
+    without: as given.
     """
 
     def __init__(self, path: str | Path, rows: Sequence[Mapping[str, Any]] = (), dim: int = 2,
                  without: Collection[str] = ()) -> None:
-        self.path, self.dim = Path(path), dim
+        self.path, self.dim, self.without = Path(path), dim, frozenset(without)
         self.rows = [_row(row) for row in rows]
         self._written = [name for name in HISTORY_COLUMNS if name not in without]
         header = [name for name, column in zip(history_header(dim), HISTORY_COLUMNS) if column in self._written]
@@ -161,7 +165,8 @@ class History:
 
     def columns(self) -> Table:
         """The columns as arrays (rows,): `phase` of str, counts of int64, all others of float64."""
-        return Table(_columns({name: [row[name] for row in self.rows] for name in HISTORY_COLUMNS}), self.dim)
+        return Table(_columns({name: [row[name] for row in self.rows] for name in HISTORY_COLUMNS}), self.dim,
+                     self.without)
 
     @staticmethod
     def load(path: str | Path) -> Table:
@@ -188,7 +193,8 @@ class History:
             raise OutputError(f"{path} is not a history file of this version, or is damaged: {error}") from None
         except (IndexError, ValueError) as error:
             raise OutputError(f"{path} is not a history file of skfsink, or is damaged") from error
-        return Table({**columns, **unknown}, dim or (3 if np.isfinite(columns["tip_z_mm"]).any() else 2))
+        return Table({**columns, **unknown}, dim or (3 if np.isfinite(columns["tip_z_mm"]).any() else 2),
+                     HISTORY_COLUMNS.keys() - known.keys())
 
 
 def _known(header: list[str]) -> tuple[dict[str, int], int]:

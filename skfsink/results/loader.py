@@ -199,7 +199,8 @@ class Run:
     def event(self) -> Table:
         """The rows of the history that belong to the event."""
         rows = self.history["phase"] == "event"
-        return Table({name: values[rows] for name, values in self.history.items()}, self.history.dim)
+        return Table({name: values[rows] for name, values in self.history.items()}, self.history.dim,
+                     self.history.without)
 
     @cached_property
     def frames(self) -> Frames:
@@ -223,19 +224,16 @@ class Run:
 
     @cached_property
     def energies(self) -> dict[str, Energy]:
-        """Where the energy of the event is, by name of `ENERGIES`; empty before the event.
-
-        `viscous` is there where it is not zero.
-        """
+        """Where the energy of the event is, by name of `ENERGIES`, as far as the run has it; empty before the event."""
         event = self.event
         if not event["step"].size:
             return {}
         row = self._arrival_row()
         found = {}
         for name, columns, meaning in ENERGIES:
-            values = np.sum([event[column] for column in columns], axis=0)
-            if name == "viscous" and not values.any():
+            if name in event.without:
                 continue
+            values = np.sum([event[column] for column in columns], axis=0)
             found[name] = Energy(meaning, event.units[columns[0]], float(values[0]),
                                  None if row is None else float(values[row]), float(values[-1]))
         return found

@@ -185,7 +185,7 @@ def _read(run: Path, number: int, time: float, dim: int) -> Frame:
 
 def _table(history: Table) -> str:
     header = dict(zip(HISTORY_COLUMNS, history_header(history.dim)))
-    names = [name for name in header if name != "viscous" or history[name].any()]
+    names = [name for name in header if name not in history.without]
     cells = [[f"{value:.{DIGITS}g}" if values.dtype.kind == "f" else str(value) for value in values]
              for values in (history[name] for name in names)]
     return "".join(",".join(row) + "\n" for row in [[header[name] for name in names], *zip(*cells)])

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ..fields.energy import OPTIONAL_TERMS, terms_without
 from ..fields.fragments import fragments
 from ..results.frame import SPENT
 from ..results.history import history_units, load_name
@@ -29,6 +30,7 @@ def summarize(scene: Scene, simulation: Simulation) -> dict[str, Any]:
     ledger, onset, tracker = state.ledger, simulation.onset.figures, crack.tracker
     space, cost = scene.sample.space, simulation.cost()
     dynamic = scene.controls.analysis == "dynamic"
+    without = terms_without(simulation.momentum, dynamic)
     units = history_units(space.dim)
     balances = [abs(row["balance"]) for row in simulation.history.rows if row["phase"] != "loading"]
     ratio, place = greatest_ratio(simulation.density, state)
@@ -58,8 +60,8 @@ def summarize(scene: Scene, simulation: Simulation) -> dict[str, Any]:
                    "D_sink_stored": ledger.sink_stored, "D_sink_kinetic": ledger.sink_kinetic,
                    "initial": ledger.initial, "elastic_final": ledger.elastic, "kinetic_final": ledger.kinetic,
                    "external_work": onset.get("work", 0.0) + ledger.work, "deletion": ledger.deletion,
-                   "numerical": ledger.numerical, "released": ledger.released, "contact": ledger.contact,
-                   **({"viscous": ledger.viscous} if ledger.viscous else {}),
+                   "numerical": ledger.numerical, "released": ledger.released,
+                   **{name: getattr(ledger, name) for name in OPTIONAL_TERMS if name not in without},
                    "balance_error_relative": max(balances, default=0.0) / onset["elastic_energy"] if onset else None},
         "quantities": measured(scene, simulation), "model": dict(scene.model_choice) or None,
         "whole": {"energy": scene.whole.energy, "load": scene.whole.load, "displacement": scene.whole.displacement},

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from ...errors import CheckpointError, ParameterError
+from ...fields.energy import terms_without
 from ...results.history import HISTORY_COLUMNS, deletions_header
 from ...results.history import History as Rows
 from ...system.files import write_atomic
@@ -93,9 +94,7 @@ class History(Observer):
 
     def prepare(self, view: View) -> None:
         """Begin the file with the rows so far."""
-        momentum = view.body.momentum
-        asked = {"contact": momentum.contact is not None, "viscous": momentum.is_viscous and not view.quasistatic}
-        without = [name for name, is_asked in asked.items() if not is_asked]
+        without = terms_without(view.body.momentum, not view.quasistatic)
         self._table = Rows(view.folder / "history.csv", self._kept, view.body.space.dim, without)
 
     def loading(self, view: View) -> None:
