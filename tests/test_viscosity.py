@@ -111,19 +111,37 @@ def test_rigid_motion_has_no_viscous_force(kind: str, element: str) -> None:
     close(momentum.viscous_force(x @ Q.T - momentum.space.X, v @ Q.T), force @ Q.T, 1e-10)
 
 
-def test_simple_shear_and_compression_by_hand() -> None:
-    """Fails if eta or the coefficients of the bulk viscosity mean something else: forces on a face of a unit square."""
-    space = Space(grid("quad", (1, 1)))
+@pytest.mark.parametrize(("kind", "element"), [("quad", "jbar"), ("hex", "jbar"), ("quad", "planestress")])
+def test_simple_shear_and_compression_by_hand(kind: str, element: str) -> None:
+    """Fails if eta or the coefficients of the bulk viscosity mean something else: forces on a face of one element.
+
+    It is deformed, and its edges differ. Seen to fail with 1/J, the length L, the square of b2 or 4/3 eta left out, and
+    with the quadratic term in an element that expands.
+    """
+    size = (0.5, 0.32) if kind == "quad" else (0.5, 0.32, 0.9)
+    dim, bulk = len(size), NO_BULK if element == "planestress" else BULK
+    space = Space(grid(kind, (1,) * dim, size))
     material = NeoHookean(mu=1.0, bulk_modulus=100.0, viscosity=ETA)
-    momentum, still = Momentum(space, material, bulk_viscosity=BULK), np.zeros_like(space.X)
-    top, rate = np.isclose(space.X[:, 1], 1.0), 1e5
-    shear = momentum.viscous_force(still, space.X[:, ::-1] * [rate, 0.0])
-    assert shear[top].sum(axis=0) == pytest.approx([ETA * rate, 0.0], abs=1e-12)
-    c_d = material.dilatational_wave_speed * 1e3
-    for sign, more in ((1.0, 0.0), (-1.0, 1.2**2 * rate / c_d)):
-        pulled = momentum.viscous_force(still, space.X * [0.0, sign * rate])
-        q = material.rho0 * c_d * (0.06 + more) * sign * rate
-        assert pulled[top].sum(axis=0) == pytest.approx([0.0, 4 / 3 * ETA * sign * rate + q], rel=1e-12, abs=1e-12)
+    momentum = Momentum(space, material, element, bulk_viscosity=bulk)
+    top, area = np.isclose(space.X[:, 1], 0.32), np.prod(size) / 0.32
+    c_d, length = material.dilatational_wave_speed * 1e3, float(np.prod(size)) ** (1 / dim)
+    F = np.eye(3)
+    F[:dim, :dim] = np.array([[1.3, 0.2, 0.1], [0.0, 0.8, -0.1], [0.0, 0.1, 1.1]])[:dim, :dim]
+    J = float(np.linalg.det(F))
+    for l in ([[0, 1, 0], [0, 0, 0], [0, 0, 0]], [[0, 0, 0], [0, 1, 0], [0, 0, 0]], [[0, 0, 0], [0, -1, 0], [0, 0, 0]]):
+        rate = 1e5 * np.array(l, float)[:dim, :dim]
+        x = space.X @ F[:dim, :dim].T
+        force = momentum.viscous_force(x - space.X, x @ rate.T)[top].sum(axis=0)
+        d = 0.5 * (rate + rate.T)
+        trace = float(np.trace(d))
+        if element == "planestress":  # d_33 = -tr d, J = 1, and the pressure that leaves no stress across the sheet
+            stress, of_volume = 2 * ETA * (d + trace * np.eye(dim)), 1.0
+        else:
+            more = bulk.quadratic**2 * length * max(0.0, -J * trace) / c_d
+            q = material.rho0 * c_d * length * (bulk.linear + more) * J * trace
+            stress, of_volume = 2 * ETA * (d - trace / 3 * np.eye(dim)) + q * np.eye(dim), J
+        nominal = of_volume * stress @ np.linalg.inv(F[:dim, :dim]).T
+        assert force == pytest.approx(nominal[:, 1] * area, rel=1e-12, abs=1e-12)
 
 
 @pytest.mark.parametrize(("kind", "element"), [("quad", "jbar"), ("hex", "jbar"), ("quad", "planestress")])
@@ -147,8 +165,8 @@ LAYERS, PERIODS = 24, 4
 
 
 def standing_wave(kind: str, axis: int, scheme: Callable, *, viscosity: float = 0.0,
-                  bulk: BulkViscosity = NO_BULK) -> tuple[float, float]:
-    """Amplitude left of a small wave across a strip 1 mm high, held at both ends, and the decay expected of it.
+                  bulk: BulkViscosity = NO_BULK, amplitude: float = 1e-5) -> tuple[float, float]:
+    """Share left of the `amplitude` [mm] of a wave across a strip 1 mm high, held at both ends, and what is expected.
 
     `axis` is that of the motion: 0 shears, 1 stretches. After whole periods the displacement is at its greatest again.
     """
@@ -159,7 +177,7 @@ def standing_wave(kind: str, axis: int, scheme: Callable, *, viscosity: float = 
     free = np.zeros_like(space.X, bool)
     free[~(ends(space)[0] | ends(space)[1]), axis] = True
     state, h = State.intact(space), 1.0 / LAYERS
-    state.u[:, axis] = shape = 1e-5 * np.sin(np.pi * space.X[:, 1])
+    state.u[:, axis] = shape = amplitude * np.sin(np.pi * space.X[:, 1])
     k = 2 / h * np.sin(np.pi * h / 2)  # wave number of the mesh
     modulus = material.shear_modulus if axis == 0 else material.bulk_modulus + 4 / 3 * material.shear_modulus
     eta = viscosity * (1.0 if axis == 0 else 4 / 3)
@@ -206,9 +224,20 @@ def test_longitudinal_wave_decays_by_the_bulk_viscosity(kind: str, name: str) ->
 
 
 def test_quadratic_term_damps_what_is_compressed() -> None:
-    """Fails if b2 does not act, or acts on small waves as on strong ones."""
+    """Fails if b2 does not act, or acts on small waves as on strong ones, or on what expands.
+
+    The power is rho L^2 b2^2 |D|^3 in what is compressed. Its mean over a wave A sin(kx) cos(wt) and the energy
+    rho w^2 A^2/4 give 1/A = 1/A0 + (4/3pi)^2 L^2 b2^2 k^3 wt, as long as little is lost.
+
+    Seen to fail with b2 left out, with its square left out, and with elements that expand counted.
+    """
     left, _ = standing_wave("quad", 1, SCHEMES["explicit"], bulk=BulkViscosity(0.0, 1.2))
     assert left == pytest.approx(1.0, rel=1e-3)
+    b2, amplitude, L = 30.0, 2e-4, 1 / LAYERS
+    k = 2 / L * np.sin(np.pi * L / 2)
+    left, _ = standing_wave("quad", 1, SCHEMES["explicit"], bulk=BulkViscosity(0.0, b2), amplitude=amplitude)
+    grown = (4 / (3 * np.pi)) ** 2 * L**2 * b2**2 * k**3 * 2 * np.pi * PERIODS
+    assert 1 / left - 1 == pytest.approx(amplitude * grown, rel=0.03) and amplitude * grown > 0.04
 
 
 # --- the stable step ---
@@ -374,7 +403,8 @@ def test_steps_without_viscosity_ask_for_no_force(monkeypatch: pytest.MonkeyPatc
 
 
 # --- runs, options, files ---
-ASKED: dict[str, dict[str, Any]] = {"plain": {}, "viscous": {"bulk_viscosity_linear": 0.5}, "contact": {"contact": True}}
+ASKED: dict[str, dict[str, Any]] = {"plain": {}, "viscous": {"bulk_viscosity_linear": 0.5},
+                                    "contact": {"contact": True}}
 
 
 @pytest.mark.parametrize(("integrator", "names"), [("explicit", ("plain", "viscous", "contact")),
@@ -403,7 +433,7 @@ def test_column_and_summary(tmp_path: Path, integrator: str, names: tuple[str, .
 
 @pytest.mark.parametrize("dynamic", [True, False])
 def test_terms_that_a_run_asks_for(dynamic: bool) -> None:
-    """Fails if a viscosity of one region alone, or contact, asks for nothing; or a viscosity does in quasi-static passes.
+    """Fails if contact or a viscosity of one region asks for nothing, or a viscosity asks in quasi-static passes.
 
     Seen to fail with the analysis not looked at, and with the materials of regions left out.
     """

@@ -32,8 +32,8 @@ OPTIONAL_TERMS = ("contact", "viscous")
 def terms_without(momentum: Momentum, dynamic: bool) -> tuple[str, ...]:
     """The optional terms that neither options nor materials of a run ask for; none of its files has them.
 
-    This alone says whether a term is written, whatever its value: `contact` in runs with contact, `viscous` in `dynamic`
-    ones with a viscosity. What is made from the files of a run takes it from the header of `history.csv`.
+    This alone says whether a term is written, whatever its value: `contact` in runs with contact, `viscous` in
+    `dynamic` ones with a viscosity. What is made from the files of a run takes it from the header of `history.csv`.
     """
     asked = {"contact": momentum.contact is not None, "viscous": dynamic and momentum.is_viscous}
     return tuple(name for name in OPTIONAL_TERMS if not asked[name])
