@@ -84,9 +84,10 @@ def test_fingerprint_tells_scenes_apart(mesh: Path, tmp_path: Path) -> None:
         kernels="forms", energy_tolerance=1e-4, gradient="gauss", viscosity=1e-5,
         bulk_viscosity_linear=0.06, bulk_viscosity_quadratic=1.2,
         ).parameters().items()
-        if name not in (*of_named_meshes, "analysis", "start", "material", "constants", "contact")]
+        if name not in (*of_named_meshes, "analysis", "start", "material", "constants", "contact", "debris")]
     others += [scene(mesh, material="gent"), scene(mesh, material="gent", constants="mu = 0.3")]
-    others += [scene(mesh, analysis="quasistatic"), scene(mesh, start="rest"), scene(mesh, contact=True)]
+    others += [scene(mesh, analysis="quasistatic"), scene(mesh, start="rest"), scene(mesh, contact=True),
+               scene(mesh, debris="remove")]
     bodies = []
     for change in (0, 1, 2):
         body = plate(n=13 if change else 11)

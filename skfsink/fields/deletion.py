@@ -6,10 +6,14 @@ import numpy as np
 
 from ..fem.space import Space
 from ..system.jit import njit
+from .density import DensitySolver
+from .fragments import debris
 from .momentum import Momentum
 from .state import State
 
-__all__ = ["delete_failed", "left_in"]
+__all__ = ["delete_debris", "delete_failed", "left_in"]
+
+GONE = 800.0  # W/Phi from which on H is zero in double precision, for any m
 
 
 def delete_failed(space: Space, state: State, threshold: float, failure_energy: float | np.ndarray) -> np.ndarray:
@@ -28,6 +32,21 @@ def delete_failed(space: Space, state: State, threshold: float, failure_energy: 
         else:
             state.ledger.paper += failure_energy * float(space.V[failed].sum())
     return failed
+
+
+def delete_debris(state: State, density: DensitySolver, held: np.ndarray) -> np.ndarray:
+    """Mark the elements of :func:`.debris`, of pieces without a node that is `held` (n,); returns their numbers.
+
+    They are logged as failed elements are, but are no part of U: they have not failed. Their history becomes that of
+    failed elements, so that gamma goes to zero there with the next solve.
+    """
+    found = debris(density.space, state.gamma, state.deleted, held, density.law.length_scale)
+    if found.size:
+        state.deleted[found] = True
+        state.deletions.extend((state.time, int(e)) for e in found)
+        phi = np.broadcast_to(density.phi, state.W_max.shape)
+        state.W_max[found] = np.maximum(state.W_max[found], GONE * phi[found])
+    return found
 
 
 def left_in(momentum: Momentum, gamma: np.ndarray, failed: np.ndarray) -> float:

@@ -55,8 +55,8 @@ class Ledger:
     kinetic: gamma-weighted kinetic energy.
     work: work of the grips, and -u.df of dead loads f that change.
     sink_stored, sink_kinetic: the two parts of D.
-    deletion: stored and kinetic energy of elements at the moment they were deleted, and what contact loses as density
-        falls.
+    deletion: stored energy of elements at the moment they were deleted, of debris the kinetic one too, and what contact
+        loses as density falls.
     numerical: dissipation of the scheme, from its own identity (negative: it fed energy in).
     released: energy a quasi-static analysis gives up in relaxing at fixed gamma; a dynamic one turns it into motion.
     viscous: work done against viscosity, never negative but for terms of second order in the step.

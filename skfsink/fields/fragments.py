@@ -10,7 +10,9 @@ from scipy.sparse.csgraph import connected_components
 
 from ..fem.space import Space
 
-__all__ = ["Fragments", "fragments", "joined"]
+__all__ = ["SPENT", "Fragments", "debris", "fragments", "joined"]
+
+SPENT = 1e-2        # nodes with a lower gamma carry nothing, and their displacement has no meaning
 
 
 class Fragments(NamedTuple):
@@ -40,10 +42,26 @@ def joined(conn: np.ndarray, holds: np.ndarray) -> np.ndarray:
 def fragments(space: Space, gamma: np.ndarray, deleted: np.ndarray, length_scale: float, floor: float) -> Fragments:
     """The pieces at the nodal density `gamma` (n,), of elements that are not `deleted` (ne,), joined where it is above
     `floor`."""
-    holds = (gamma[space.conn] > floor) & ~deleted[:, None]
-    alive = np.flatnonzero(holds.any(axis=1))
+    alive, piece = _pieces(space, gamma, deleted, floor)
     if not alive.size:
         return Fragments(0, 0, 0.0)
-    volume = np.bincount(joined(space.conn[alive], holds[alive]), space.V[alive])
-    debris = volume[volume < length_scale**space.dim]
-    return Fragments(volume.size, debris.size, float(debris.sum() / space.V.sum()))
+    volume = np.bincount(piece, space.V[alive])
+    small = volume[volume < length_scale**space.dim]
+    return Fragments(volume.size, small.size, float(small.sum() / space.V.sum()))
+
+
+def debris(space: Space, gamma: np.ndarray, deleted: np.ndarray, held: np.ndarray, length_scale: float) -> np.ndarray:
+    """Numbers of the elements of pieces smaller than l, joined above `SPENT`, without a node that is `held` (n,)."""
+    alive, piece = _pieces(space, gamma, deleted, SPENT)
+    if not alive.size:
+        return alive
+    small = np.bincount(piece, space.V[alive]) < length_scale**space.dim
+    small[piece[held[space.conn[alive]].any(axis=1)]] = False
+    return alive[small[piece]]
+
+
+def _pieces(space: Space, gamma: np.ndarray, deleted: np.ndarray, floor: float) -> tuple[np.ndarray, np.ndarray]:
+    """Numbers of the elements that bear force, ascending, and the piece that each of them belongs to."""
+    holds = (gamma[space.conn] > floor) & ~deleted[:, None]
+    alive = np.flatnonzero(holds.any(axis=1))
+    return alive, joined(space.conn[alive], holds[alive]) if alive.size else alive

@@ -7,10 +7,11 @@ from typing import Protocol
 
 from ..errors import choose, require
 
-__all__ = ["COUPLINGS", "MASSES", "EventControls", "ExplicitControls", "HHTControls", "StaticsControls"]
+__all__ = ["COUPLINGS", "DEBRIS", "MASSES", "EventControls", "ExplicitControls", "HHTControls", "StaticsControls"]
 
 COUPLINGS = ("iterated", "single")
 MASSES = ("lumped", "consistent")
+DEBRIS = ("keep", "remove")
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,7 @@ class ExplicitControls:
     estimate_change: relative change of the cheap indicator that calls for a new estimate, in (0, 1).
     energy_tolerance: energy that a step may feed in or take out, of that of the body, in [0, 1]; else it is made again
         half as long. 0: no step is rejected, and one that feeds in energy calls for a new estimate of the limit.
+    debris: "keep" or "remove" (delete pieces smaller than l that are cut off from all grips).
     """
 
     courant: float = 0.8
@@ -34,6 +36,7 @@ class ExplicitControls:
     estimate_every: int = 400
     estimate_change: float = 0.1
     energy_tolerance: float = 2e-5
+    debris: str = "keep"
 
     def __post_init__(self) -> None:
         require("courant", self.courant, low=0, high=1, low_open=True)
@@ -42,6 +45,7 @@ class ExplicitControls:
         require("estimate_every", self.estimate_every, "steps", low=1, whole=True)
         require("estimate_change", self.estimate_change, low=0, high=1, low_open=True, high_open=True)
         require("energy_tolerance", self.energy_tolerance, low=0, high=1)
+        choose("debris", self.debris, DEBRIS)
 
 
 @dataclass(frozen=True)

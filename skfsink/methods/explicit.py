@@ -29,7 +29,7 @@ import numpy as np
 from ..errors import InstabilityError, place_text
 from ..fields.active_zone import Zone
 from ..fields.body import Body
-from ..fields.deletion import delete_failed, left_in
+from ..fields.deletion import delete_debris, delete_failed, left_in
 from ..fields.density import Density
 from ..fields.state import State
 from .controls import EventControls, ExplicitControls
@@ -70,6 +70,7 @@ class Explicit:
         self.controls = controls or ExplicitControls()
         self.space, self.free = body.space, body.free
         self._free = np.ascontiguousarray(self.free.reshape(-1, self.space.dim))
+        self._held = ~self._free.all(axis=1)
         self._grip_velocity, self._knot = self.loading.velocity(0.0), np.inf
         self._mass_floor = max(self.controls.mass_floor, 1e-12)  # a node without mass or force stays where it is
         self.length = StepLength(self.momentum, self.free, self.controls, self._interval)
@@ -225,7 +226,7 @@ class Explicit:
         state.ledger.work += state.ledger.kinetic - before
 
     def update_density(self, state: State) -> None:
-        """Solve for gamma from the history, book what the sink takes, delete failed elements."""
+        """Solve for gamma from the history, book what the sink takes, delete failed elements, and debris they leave."""
         momentum, ledger = self.momentum, state.ledger
         state.W_max = momentum.backend.untile(self._W_max)
         before = Density(state.gamma, state.sink, self._zones)
@@ -235,24 +236,32 @@ class Explicit:
         state.gamma, state.sink, self._zones = now
         failed = delete_failed(self.space, state, self.body.deletion, self.density.failure_energy)
         left = left_in(momentum, state.gamma, failed) if failed.size else 0.0
+        stored, moving = self._thin(state)
+        ledger.sink_stored += stored - left
+        ledger.deletion += left
+        ledger.sink_kinetic += moving
+        if failed.size and self.controls.debris == "remove" and delete_debris(state, self.density, self._held).size:
+            self._W_max = momentum.backend.tile(state.W_max)
+            ledger.deletion += sum(self._thin(state))
+        self._renew_contact(state)
+
+    def _thin(self, state: State) -> tuple[float, float]:
+        """Take density and deleted elements of `state`; returns the stored and the kinetic energy that go with it."""
+        momentum, ledger, mass = self.momentum, state.ledger, self.mass
         dead, loads = momentum.dead, None if momentum.dead is None else momentum.dead.values
         stored = momentum.set_gamma(state.gamma, state.deleted)
-        mass = self.mass
         self._set_mass()
         if self._viscous is not None:
             ratio = np.divide(self.mass, mass, out=np.zeros_like(mass), where=mass > 0.0)
-            self._viscous *= ratio[:, None]  # as the inertia, of kept accelerations
-        ledger.sink_stored += stored - left
-        ledger.deletion += left
+            self._viscous *= ratio[:, None]  # as the inertia, of kept accelerations; 0 without mass
         half_v2 = half_square(state.v)
-        ledger.sink_kinetic += float((mass - self.mass) @ half_v2)
         if dead is not None and loads is not None:
             ledger.work += dead.changed(loads, state.u)
             ledger.loads = dead.potential(state.u)
         self._elastic -= stored
         ledger.elastic = self._elastic
         ledger.kinetic = float(self.mass @ half_v2)
-        self._renew_contact(state)
+        return stored, float((mass - self.mass) @ half_v2)
 
     def sync(self, state: State) -> None:
         """Bring `state.W_max`, and the motion of nodes that follow the lips, up to date."""
@@ -267,8 +276,6 @@ class Explicit:
         if contact is None:
             return
         self.reaction[contact.massless] = 0.0
-        if self._viscous is not None:
-            self._viscous[contact.massless] = 0.0
         contact.book(state.ledger, state.u)
         self._pressed = contact.energy
 

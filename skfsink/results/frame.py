@@ -8,9 +8,9 @@ from pathlib import Path
 import meshio
 import numpy as np
 
-__all__ = ["SPENT", "Frame", "frame_file", "read_frame"]
+from ..fields.fragments import SPENT
 
-SPENT = 1e-2        # nodes with a lower gamma carry nothing, and their displacement has no meaning
+__all__ = ["SPENT", "Frame", "frame_file", "read_frame"]
 
 
 def frame_file(name: str, number: int) -> str:

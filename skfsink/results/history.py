@@ -65,7 +65,7 @@ HISTORY_COLUMNS: dict[str, Column] = {
     "tip_speed_m_per_s": Column("speed of the leading tip", "m/s"),
     "tips": Column("tips that advance", kind=int),
     "branches": Column("branches, advancing or arrested", kind=int),
-    "deleted_elements": Column("failed elements", kind=int),
+    "deleted_elements": Column("failed elements, and those of debris that was removed", kind=int),
     "gamma_min": Column("least relative density of a node"),
     "dt_s": Column("time step", "s"),
 }

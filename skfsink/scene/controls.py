@@ -84,6 +84,9 @@ class Controls:
         if self.contact and self.element == "planestress":
             raise ParameterError("contact is for elements jbar and plain; got planestress: the lips of a thin sheet "
                                  "buckle out of it")
+        if self.explicit.debris == "remove" and (self.integrator, self.analysis) != ("explicit", "dynamic"):
+            raise ParameterError(f"debris remove is for analysis dynamic with integrator explicit; got analysis "
+                                 f"{self.analysis}, integrator {self.integrator}: take debris keep")
         choose("sink", self.sink, SINKS)
         choose("gradient", self.gradient, GRADIENTS)
         choose("element", self.element, ELEMENTS)

@@ -149,6 +149,8 @@ class Options:
     energy_tolerance
         Energy that an explicit step may feed in or take out, of that of the body, in [0, 1]; else it is rejected and
         made again half as long. 0 rejects none.
+    debris
+        Pieces smaller than l that an explicit event has cut off from all grips: "keep" or "remove" (delete them).
     mass_floor
         Least lumped mass of a node, relative to the intact one, in [0, 1).
     hht_alpha
@@ -225,6 +227,7 @@ class Options:
     courant: Annotated[float, EXPLICIT] = ExplicitControls.courant
     gamma_every: Annotated[int, EXPLICIT] = ExplicitControls.gamma_every
     energy_tolerance: Annotated[float, EXPLICIT] = ExplicitControls.energy_tolerance
+    debris: Annotated[str, EXPLICIT] = ExplicitControls.debris
     mass_floor: Annotated[float, EXPLICIT] = ExplicitControls.mass_floor
     hht_alpha: Annotated[float, HHT] = HHTControls.alpha
     hht_dt: Annotated[float, HHT, Unit("s")] = HHTControls.dt
@@ -306,7 +309,7 @@ class Options:
                   if f.name not in ("explicit", "hht", "statics")}
         return Controls(
             **shared, explicit=ExplicitControls(self.courant, self.gamma_every, self.mass_floor,
-                                                energy_tolerance=self.energy_tolerance),
+                                                energy_tolerance=self.energy_tolerance, debris=self.debris),
             hht=HHTControls(self.hht_alpha, self.hht_dt, coupling=self.coupling, mass=self.mass,
                             mass_floor=self.mass_floor),
             statics=StaticsControls(front=self.front))
