@@ -7,8 +7,9 @@ import copy
 import numpy as np
 import pytest
 from bodies import FAILED, ends, grid, grips, held_body
+from guarded import Watched
 
-from skfsink.errors import ParameterError
+from skfsink.errors import InstabilityError, ParameterError
 from skfsink.fem.space import Space
 from skfsink.fields.contact import Contact
 from skfsink.fields.density import DensitySolver
@@ -91,7 +92,7 @@ def test_energies_of_debris_are_booked() -> None:
     mass = explicit.momentum.material.rho0 * SPACE.lump(at_gauss)
     kinetic = 0.5 * float(mass @ (state.v**2).sum(axis=1))
     assert kinetic > 0.1 * stored > 0.0
-    assert state.ledger.deletion == pytest.approx(stored + kinetic, rel=1e-9)
+    assert state.ledger.deletion == state.ledger.debris == pytest.approx(stored + kinetic, rel=1e-9)
     assert state.ledger.paper == pytest.approx(LAW.failure_energy * SPACE.V[RING].sum())
     assert abs(state.ledger.balance) < 1e-12 * state.ledger.initial
     explicit.update_density(state)
@@ -150,6 +151,18 @@ def test_resumed_run_removes_the_same(steps: int) -> None:
     for field in ("u", "v", "a", "gamma", "W_max", "deleted"):
         np.testing.assert_array_equal(getattr(state, field), getattr(resumed, field), err_msg=field)
     assert state.ledger == resumed.ledger and state.deletions == resumed.deletions and state.deleted[ISLAND].all()
+
+
+def test_guard_lets_debris_go() -> None:
+    """Fails if a run is stopped for what was in debris, or is not for what was in failed elements."""
+    watched = Watched()
+    ledger = watched.state.ledger
+    ledger.initial += 0.2
+    ledger.deletion = ledger.debris = 0.2
+    watched.guard.check_record(watched.state)
+    ledger.debris = 0.1
+    with pytest.raises(InstabilityError, match=r"^energy lost in deleted elements 10.00%"):
+        watched.guard.check_record(watched.state)
 
 
 @pytest.mark.parametrize("options", [{"analysis": "quasistatic"}, {"analysis": "both"}, {"integrator": "hht"}], ids=str)

@@ -61,6 +61,7 @@ class Ledger:
     released: energy a quasi-static analysis gives up in relaxing at fixed gamma; a dynamic one turns it into motion.
     viscous: work done against viscosity, never negative but for terms of second order in the step.
     paper: U of the paper.
+    debris: the part of `deletion` that was in debris; no term of its own.
     """
 
     initial: float = 0.0
@@ -76,6 +77,7 @@ class Ledger:
     viscous: float = 0.0
     paper: float = 0.0
     contact: float = 0.0
+    debris: float = 0.0
 
     @property
     def sink(self) -> float:

@@ -242,7 +242,9 @@ class Explicit:
         ledger.sink_kinetic += moving
         if failed.size and self.controls.debris == "remove" and delete_debris(state, self.density, self._held).size:
             self._W_max = momentum.backend.tile(state.W_max)
-            ledger.deletion += sum(self._thin(state))
+            gone = sum(self._thin(state))
+            ledger.deletion += gone
+            ledger.debris += gone
         self._renew_contact(state)
 
     def _thin(self, state: State) -> tuple[float, float]:

@@ -196,17 +196,18 @@ class Guard(Observer):
         """
         ledger, space, l = state.ledger, self.space, self.scene.sink_law.length_scale
         allowed, scale = self.scene.controls.balance_tolerance, ledger.scale(self.scale)
+        lost = (ledger.deletion - ledger.debris) / scale
         worst, name = max((ledger.error(scale), "energy balance error"),
-                          (ledger.deletion / scale, "energy lost in deleted elements"), key=_nan_first)
+                          (lost, "energy lost in deleted elements"), key=_nan_first)
         if not worst <= allowed:
             cure = self._deletion_cure if "deleted" in name else self._step_cure
             raise InstabilityError(f"{name} {worst:.2%} of the onset energy at {self._when(state)}, allowed "
                                    f"{allowed:.2%}: {cure}; only then raise --balance-tolerance")
         if not (np.isfinite(state.u).all() and np.isfinite(state.v).all() and np.isfinite(state.gamma).all()):
             raise InstabilityError(f"a field is not finite at {self._when(state)}: {self._step_cure}")
-        if ledger.deletion > self.CARRIED * scale:
+        if lost > self.CARRIED:
             log.warning("elements were deleted with %.2g of the onset energy still in them (above %g): %s",
-                        ledger.deletion / scale, self.CARRIED, self._deletion_cure)
+                        lost, self.CARRIED, self._deletion_cure)
         if ledger.numerical > allowed * scale:
             log.warning("the time integration itself has dissipated %.2g of the onset energy (above %g): %s%s",
                         ledger.numerical / scale, allowed, self._step_cure,
