@@ -497,4 +497,4 @@ def test_density_is_solved_for_more_often_in_laws_that_stiffen():
         space = box("quad", 2)
         body = held_body(Momentum(space, material_from(name)), DensitySolver(space, SinkLaw(phi=limiter_of(name).phi)),
                          np.ones(2 * space.n_nodes, bool), np.zeros_like(space.X))
-        assert Explicit(body)._stiffening == pytest.approx(shorter, rel=2e-3)
+        assert Explicit(body).interval.stiffening == pytest.approx(shorter, rel=2e-3)

@@ -21,7 +21,7 @@ class ExplicitControls:
     Parameters
     ----------
     courant: step as a fraction of the estimated stability limit 2/omega_max, in (0, 1].
-    gamma_every: steps between solves for gamma, >= 1; 0 takes as many as fit in `GAMMA_INTERVAL` l/c_s.
+    gamma_every: steps between solves for gamma, >= 1; 0 takes as many as fit; see :class:`.SolveInterval`.
     mass_floor: least lumped mass, as a fraction of the intact one, in [0, 1).
     estimate_every: steps after which omega_max is estimated again at the latest, >= 1.
     estimate_change: relative change of the cheap indicator that calls for a new estimate, in (0, 1).

@@ -26,7 +26,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..errors import InstabilityError, place_text
 from ..fields.active_zone import Zone
 from ..fields.body import Body
 from ..fields.deletion import delete_debris, delete_failed, left_in
@@ -34,6 +33,7 @@ from ..fields.density import Density
 from ..fields.state import State
 from .controls import EventControls, ExplicitControls
 from .nodal_steps import half_square, kick, move, viscous_work
+from .solve_interval import SolveInterval
 from .step_length import StepLength
 
 __all__ = ["Explicit"]
@@ -53,13 +53,11 @@ class Explicit:
 
     Attributes
     ----------
+    length, interval: of the steps, and between solves for gamma.
     dt: the current step [s].   estimates: frequency estimates made.   factorisations: none.
     reaction: (n, dim) internal and viscous force less the dead loads.
     """
 
-    GAMMA_INTERVAL = 0.03  # l/c_s between solves for gamma; the crack then runs less than 3 % of l
-    STIFFENING = 4 / 3  # waves at failure faster than this times c_s, as in the tissue, make them more frequent
-    GAMMA_MOST = 10  # steps between them at the most, lest a failing element that shortens the step keeps failing
     GAMMA_TOLERANCE = 1e-6  # relative residual of a solve for gamma
     _REMEMBERED = ("_elastic", "_since_gamma", "_compression")
 
@@ -73,8 +71,8 @@ class Explicit:
         self._held = ~self._free.all(axis=1)
         self._grip_velocity, self._knot = self.loading.velocity(0.0), np.inf
         self._mass_floor = max(self.controls.mass_floor, 1e-12)  # a node without mass or force stays where it is
-        self.length = StepLength(self.momentum, self.free, self.controls, self._interval)
-        self._stiffening = max(1.0, body.wave_speed_at_failure / self.momentum.shear_wave_speeds[1] / self.STIFFENING)
+        self.interval = SolveInterval(body, self.controls.gamma_every)
+        self.length = StepLength(self.momentum, self.free, self.controls, self.interval.longest)
         self._since_gamma = 0
         self._viscous: np.ndarray | None = None  # viscous force in `reaction`
         self._compression = 0.0
@@ -144,11 +142,11 @@ class Explicit:
         self.length.look(state.step, state.u, self.mass, self._inverse, self._compression)
         while not self._try(state):
             if self.length.is_given_up:
-                self._give_up(state)
+                self.length.give_up(state, self._next[1])
         if state.grip == self._knot:
             self._turn(state)
         self._since_gamma += 1
-        if self._since_gamma >= self._gamma_every:
+        if self._since_gamma >= self.interval.steps(self.dt):
             self._since_gamma = 0
             self.update_density(state)
 
@@ -202,20 +200,6 @@ class Explicit:
         state.grip = grip
         state.step += 1
         return True
-
-    def _give_up(self, state: State) -> None:
-        """The step that was tried last left its velocities in `_next`."""
-        if not self.length.rejects:
-            raise InstabilityError(
-                f"the explicit integration blew up at t = {state.time:.4g} s (step {state.step}): lower courant, now "
-                f"{self.controls.courant:g}, or reject such steps by an energy_tolerance of "
-                f"{ExplicitControls.energy_tolerance:g}")
-        speed = np.abs(np.nan_to_num(self._next[1], nan=np.inf)).max(axis=1)
-        raise InstabilityError(
-            f"no explicit step down to {self.length.dt:.2g} s keeps the energy of the body to "
-            f"{self.controls.energy_tolerance:g} of it, at t = {state.time:.4g} s (step {state.step}), near "
-            f"{place_text(self.space.X[int(np.argmax(speed))])} mm of the undeformed body: refine the mesh there, "
-            f"raise energy_tolerance, or take --integrator hht")
 
     def _turn(self, state: State) -> None:
         """At a knot: grips take their new velocities at once; what that needs is their work."""
@@ -280,18 +264,6 @@ class Explicit:
         self.reaction[contact.massless] = 0.0
         contact.book(state.ledger, state.u)
         self._pressed = contact.energy
-
-    @property
-    def _gamma_every(self) -> int:
-        """Steps between solves for gamma."""
-        if self.controls.gamma_every:
-            return self.controls.gamma_every
-        return min(max(1, int(self._interval / self._stiffening / self.dt)), self.GAMMA_MOST)
-
-    @property
-    def _interval(self) -> float:
-        """Longest time between solves for gamma, and longest step, by the waves of the undeformed body [s]."""
-        return self.GAMMA_INTERVAL * self.density.law.length_scale / (self.momentum.shear_wave_speeds[1] * 1e3)
 
     # --- the step size ---
     @property

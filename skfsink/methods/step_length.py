@@ -7,12 +7,14 @@ calm for a while, their length doubles again.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
+from ..errors import InstabilityError, place_text
 from ..fem.pattern import Pattern
 from ..fields.momentum import Momentum
+from ..fields.state import State
 from .controls import ExplicitControls
 from .frequency import highest_damping, highest_frequency, stable_step
 
@@ -138,6 +140,26 @@ class StepLength:
     def is_given_up(self) -> bool:
         """Whether a step that was not accepted is the end: the shortest one, or any where none is rejected."""
         return self.cut > self.CUTS or not self.rejects
+
+    def give_up(self, state: State, v: np.ndarray) -> NoReturn:
+        """End the integration of `state`, for the velocity `v` (n, dim) that the step tried last has led to.
+
+        Raises
+        ------
+        InstabilityError
+            Always.
+        """
+        if not self.rejects:
+            raise InstabilityError(
+                f"the explicit integration blew up at t = {state.time:.4g} s (step {state.step}): lower courant, now "
+                f"{self.controls.courant:g}, or reject such steps by an energy_tolerance of "
+                f"{ExplicitControls.energy_tolerance:g}")
+        speed = np.abs(np.nan_to_num(v, nan=np.inf)).max(axis=1)
+        raise InstabilityError(
+            f"no explicit step down to {self.dt:.2g} s keeps the energy of the body to "
+            f"{self.controls.energy_tolerance:g} of it, at t = {state.time:.4g} s (step {state.step}), near "
+            f"{place_text(self.momentum.space.X[int(np.argmax(speed))])} mm of the undeformed body: refine the mesh "
+            f"there, raise energy_tolerance, or take --integrator hht")
 
     @property
     def rejects(self) -> bool:
