@@ -68,7 +68,7 @@ class Explicit:
         self.controls = controls or ExplicitControls()
         self.space, self.free = body.space, body.free
         self._free = np.ascontiguousarray(self.free.reshape(-1, self.space.dim))
-        self._held = ~self._free.all(axis=1)
+        self._held: np.ndarray = np.logical_not(self._free.all(axis=1))
         self._grip_velocity, self._knot = self.loading.velocity(0.0), np.inf
         self._mass_floor = max(self.controls.mass_floor, 1e-12)  # a node without mass or force stays where it is
         self.interval = SolveInterval(body, self.controls.gamma_every)
