@@ -132,10 +132,7 @@ def test_body_does_not_notice() -> None:
 
 @pytest.mark.parametrize("steps", [2, 6])
 def test_resumed_run_removes_the_same(steps: int) -> None:
-    """Fails if a run resumed before or after debris was found ends with other bits.
-
-    Seen to fail with the history of the island raised in the state alone.
-    """
+    """Fails if a run resumed before or after debris was found ends with other bits."""
     one, state = started("remove", viscous=True, fixed=False)
     for _ in range(steps):
         one.step(state)

@@ -393,7 +393,7 @@ def test_contact_and_viscosity_share_a_ledger(fracture: Fracture) -> None:
 
 
 def test_viscous_force_falls_with_the_mass(fracture: Fracture, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Fails if the viscous force kept for the next step does not fall with the mass, as inertia does, where gamma falls.
+    """Fails if the viscous force kept for the next step does not fall with the mass where gamma falls, as inertia does.
 
     Seen to fail with that force kept as it was.
     """
