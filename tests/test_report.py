@@ -288,7 +288,7 @@ def test_curves_of_all_runs_are_whole(folder: Path, copy: Path) -> None:
 @pytest.mark.parametrize("term", OPTIONAL_TERMS)
 def test_terms_of_the_ledger_are_shown_where_the_run_has_them(folder: Path, copy: Path, term: str) -> None:
     """Fails if report, picture or stored reference show a term of the ledger by its value: here it is 0 in the run that
-    has it. Seen to fail with a term of zeros left out of each of the four."""
+    has it. Seen to fail with a term of zeros left out by the loader, the picture, and the reference."""
     rows = [dict(zip(HISTORY_COLUMNS, values)) for values in zip(*History.load(copy / "history.csv").values())]
     History(copy / "history.csv", rows, without=set(OPTIONAL_TERMS) - {term})
     plain, run = skfsink.load(folder / "dynamic"), skfsink.load(copy)

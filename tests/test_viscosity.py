@@ -229,7 +229,7 @@ def test_quadratic_term_damps_what_is_compressed() -> None:
     The power is rho L^2 b2^2 |D|^3 in what is compressed. Its mean over a wave A sin(kx) cos(wt) and the energy
     rho w^2 A^2/4 give 1/A = 1/A0 + (4/3pi)^2 L^2 b2^2 k^3 wt, as long as little is lost.
 
-    Seen to fail with b2 left out, with its square left out, and with elements that expand counted.
+    Seen to fail with b2 left out, and with elements that expand counted.
     """
     left, _ = standing_wave("quad", 1, SCHEMES["explicit"], bulk=BulkViscosity(0.0, 1.2))
     assert left == pytest.approx(1.0, rel=1e-3)
