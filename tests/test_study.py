@@ -17,7 +17,8 @@ from skfsink.cli.program import command
 from skfsink.errors import ConvergenceError, InstabilityError, Interrupted, OutputError
 from skfsink.methods.controls import ExplicitControls
 from skfsink.run.display import Display
-from skfsink.study import integrators, models, solvers, strong_laws, systems
+from skfsink.study import integrators, models, solvers, strong_laws, systems, tolerance
+from skfsink.study.integrators import TIME
 from skfsink.study.meshes import load_plate
 from skfsink.study.pareto import pareto_front
 from skfsink.study.part import Part, Planned
@@ -235,13 +236,43 @@ def test_methods_that_fail_are_rows():
         passed = 10.0 + shift + np.linspace(0, 1, 20)
         return {"arrival_us": passed[-1], "passed_us": passed.tolist(), "D": 1.0 + shift, "cpu_s": 2.0}
 
+    explicit, hht = "explicit, default but no rejection", "HHT, default but no rejection"
     points = {"onset/plate0": {}, "reference 0.2/plate0": run(0.1), "reference 0.1/plate0": run(0.0),
-              "explicit, default/plate0": run(0.11), "HHT, default/plate0": {"failed": "stalled", "cpu_s": 1.0}}
+              f"{explicit}/plate0": run(0.11), f"{hht}/plate0": {"failed": "stalled", "cpu_s": 1.0}}
     rows = {row["name"]: row for row in integrators.summary(points)}
-    assert rows["HHT, default"]["failed"] == "stalled" and "D" not in rows["HHT, default"]
-    assert rows["explicit, default"]["D"] == pytest.approx(0.11)
-    assert rows["explicit, default"]["history"] == pytest.approx(0.01)
+    assert rows[hht]["failed"] == "stalled" and "D" not in rows[hht]
+    assert rows[explicit]["D"] == pytest.approx(0.11)
+    assert rows[explicit]["history"] == pytest.approx(0.01)
     assert rows["reference 0.2"]["arrival"] == pytest.approx(0.1 / 11)
+
+
+def test_errors_of_tolerances_are_against_the_reference_of_the_same_mesh():
+    """Fails if a run is measured by another mesh or one reference run, or a method that fails somewhere has errors.
+
+    The reference arrives at 9 and 11 us on one mesh and at 20 on the other; a method at 12 and 18, so 20 % late and
+    10 % early.
+    """
+    def run(arrival: float) -> dict[str, Any]:
+        return {"arrival_us": arrival, "D": 1.0, "U": 2.0, "steps": 10, "rejected": 1, "cpu_s": 2.0}
+
+    points = {"gent/reference/0.099/0": run(9.0), "gent/reference/0.1/0": run(11.0), "gent/reference/0.1/1": run(20.0),
+              "gent/2e-05/0.8/0": run(12.0), "gent/2e-05/0.8/1": run(18.0),
+              "gent/off/0.8/0": run(10.0), "gent/off/0.8/1": {"failed": "blew up", "cpu_s": 1.0}}
+    reference, default, off = tolerance.summary(points)
+    assert default["arrival_us"] == pytest.approx((0.05, np.sqrt((0.2**2 + 0.1**2) / 2))) and default["D"] == (0.0, 0.0)
+    assert reference["arrival_us"] == pytest.approx((0.0, np.sqrt(0.02 / 3)))
+    assert off["failed"] == "blew up (1 of 2 runs)" and "D" not in off
+    lines = tolerance.table(points)
+    assert "+5.0 % (15.8 %)" in lines[3] and "default" in lines[3] and "failed: blew up" in lines[4]
+
+
+def test_parts_measured_without_rejection_plan_it():
+    """Fails if a run of a part whose points were measured without rejected steps would reject some."""
+    controls = [p.compute.method.controls for p in TIME.plan(False) if p.compute.method is not None]
+    controls += [variant.controls for variant in models.variants(False)]
+    assert len(controls) > 100
+    for c in controls:
+        assert (c.energy_tolerance == 0.0 if isinstance(c, ExplicitControls) else c.gain_tolerance == 1.0)
 
 
 def test_changes_are_against_the_base_on_the_same_mesh():
@@ -270,7 +301,7 @@ def test_quick_study(tmp_path: Path):
     after = os.times()
     assert sum(after[2:4]) - sum(before[2:4]) < 180
     assert {p.name for p in tmp_path.glob("*.png")} == {
-        "speed_accuracy.png", *(f"speed_accuracy_{part}.png" for part in ("time", "space", "model", "solvers"))}
+        "speed_accuracy.png", *(f"speed_accuracy_{part}.png" for part in PARTS)}
     content = (tmp_path / "speed_accuracy.json").read_bytes()
     subprocess.run(command, check=True, timeout=60)
     assert (tmp_path / "speed_accuracy.json").read_bytes() == content
@@ -291,14 +322,15 @@ def test_documented_figures_are_those_of_the_file(tmp_path: Path):
     """Fails if a table of the documentation is not what its JSON file gives, or that file cannot be drawn."""
     docs = Path(__file__).parents[1] / "docs"
     text = (docs / "speed_accuracy.md").read_text(encoding="utf-8").splitlines()
-    stored = json.loads((docs / "images" / "speed_accuracy.json").read_text(encoding="utf-8"))
-    assert stored["study"] == "speed_accuracy" and stored["machine"]["processor"]
     for name, part in PARTS.items():
+        file = "speed_accuracy_tolerance.json" if name == "tolerance" else "speed_accuracy.json"
+        stored = json.loads((docs / "images" / file).read_text(encoding="utf-8"))
+        assert stored["study"] == "speed_accuracy" and stored["machine"]["processor"]
         start = f"{name}/"
         points = {k.removeprefix(start): p for k, p in stored["points"].items() if k.startswith(start)}
         assert points and not [line for line in part.table(points) if line not in text]
         assert {p.key for p in part.plan(False)} == points.keys()
-        if name == "space":  # the others take long
+        if name in ("space", "tolerance"):  # the others take long
             part.draw(points, tmp_path / f"{name}.png")
             assert (tmp_path / f"{name}.png").stat().st_size > 1e5
 

@@ -158,8 +158,9 @@ class Plate:
         Returns
         -------
         `arrival_us`: when the tip passed +`run`, interpolated within the step.   `passed_us`: when it passed each of
-        `places` equal parts of the way.   `D`, `U`: energies at the arrival [N mm/mm].   `steps`, `dt_us`: number and
-        mean size of steps.   `cpu_s`: processor time of the integration alone.
+        `places` equal parts of the way.   `D`, `U`: energies at the arrival [N mm/mm].   `steps`, `rejected`,
+        `dt_us`: number of steps, of those made again, and their mean size.   `cpu_s`: processor time of the integration
+        alone.
 
         Raises
         ------
@@ -193,7 +194,7 @@ class Plate:
         scale = self.parts / self.thickness
         return {"arrival_us": passed[-1] * 1e6, "passed_us": passed * 1e6,
                 "D": float(np.interp(passed[-1], times, sink)) * scale, "U": paper[-1] * scale, "steps": state.step,
-                "dt_us": state.time / state.step * 1e6, "cpu_s": cpu}
+                "rejected": integrator.rejected, "dt_us": state.time / state.step * 1e6, "cpu_s": cpu}
 
     def _guard(self, state: State) -> None:
         ledger = state.ledger

@@ -30,14 +30,15 @@ from .part import Part, Points
 from .refinement import SPACE
 from .solvers import SOLVERS
 from .store import Store
+from .tolerance import TOLERANCE
 
 __all__ = ["PARTS", "run_parts", "speed_accuracy"]
 
-PARTS: dict[str, Part] = {part.name: part for part in (TIME, SPACE, MODEL, SOLVERS)}
+PARTS: dict[str, Part] = {part.name: part for part in (TIME, TOLERANCE, SPACE, MODEL, SOLVERS)}
 FLAG = Parameter(negative="", show_default=False)
 
 
-def speed_accuracy(*, only: Literal["time", "space", "model", "solvers"] | None = None,
+def speed_accuracy(*, only: Literal["time", "tolerance", "space", "model", "solvers"] | None = None,
                    quick: Annotated[bool, FLAG] = False, fresh: Annotated[bool, FLAG] = False,
                    out: Path = Path("results/study/speed_accuracy"), quiet: Annotated[bool, FLAG] = False) -> None:
     """Measure what each method costs and how far it is off, and chart one against the other.
@@ -45,7 +46,7 @@ def speed_accuracy(*, only: Literal["time", "space", "model", "solvers"] | None 
     Parameters
     ----------
     only
-        One part of the study: integrators, meshes and elements, the model, or linear solvers.
+        One part of the study: integrators, rejected steps, meshes and elements, the model, or linear solvers.
     quick
         Fewer points, in less than three minutes.
     fresh
