@@ -349,3 +349,20 @@ def test_strong_laws_stand_beside_their_reference() -> None:
                                "d": reference, "e": {**reference, "seed": 1}, "f": {**other, "element": "planestress"}})
     assert len(lines) == 4 and "(-5.0%, a mesh -10%)" in lines[2] and "(+0.0%, a mesh +0%)" in lines[2]
     assert not any("a mesh" in line for line in lines[3:])
+
+
+def test_scatter_is_that_of_runs_of_the_same_mesh() -> None:
+    """Fails if a deviation mixes meshes or Courant numbers, an error is not that of the mean mesh, or a run of the plan
+    is not at the Courant number of its key."""
+    def run(seed: int, D: float) -> dict[str, Any]:
+        return {"seed": seed, "D": D, "passed_1mm_us": 30.0}
+
+    points = {f"{c}, mesh {s}": run(s, D) for s, Ds in enumerate(((9.0, 11.0), (20.0, 20.0), (29.0, 31.0)))
+              for c, D in zip((0.8, 0.81), Ds)}
+    points |= {f"0.1, mesh {s}": run(s, 50.0) for s in range(3)}
+    lines = strong_laws.table_scatter(points)
+    # deviations sqrt(2), 0, sqrt(2); the error of a mesh of two runs is 1, that of the mean of three sqrt(2) / 3
+    assert lines[2] == "| 0.8 to 0.81 | 6 | 10.0 ± 1.4 | 20.0 ± 0.0 | 30.0 ± 1.4 | 20.00 ± 0.47 | 30.0 ± 0.0 |"
+    assert lines[3].startswith("| 0.1 to 0.1 | 3 | 50.0 ± 0.0 |")
+    for planned in strong_laws.plan_scatter(False):
+        assert planned.compute.keywords["courant"] == float(planned.key.split(",")[0])

@@ -4,6 +4,7 @@
 Two plates, each on three meshes, are loaded to their onset and followed for 60 us: one of 2 x 2 mm with a notch of
 0.5 mm and elements of l/2, by both integrators, and the paper's with its mesh M3 (l/3), by the explicit one. Meshes of
 M3 but the first need gmsh. Runs are compared with the explicit one of the same mesh at a Courant number of 0.1.
+How much of a difference is chance, the part `scatter` shows: the same event at Courant numbers that hardly differ.
 """
 
 # ruff: noqa: E402
@@ -20,7 +21,7 @@ import time
 from collections.abc import Sequence
 from functools import cache, partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from cyclopts import Parameter
@@ -45,6 +46,8 @@ END = 60e-6                  # of the events [s]
 SCHEMES = {"explicit": 0.8, "explicit, Courant 0.1": 0.1, "hht": None}
 REFERENCE = "explicit, Courant 0.1"
 SMALL, PAPER = "2 mm, l/2", "M3"  # the plates
+SCATTERED = ("yeoh", "planestress")       # the law and element that differ most from their reference
+COURANTS = (*(k / 100 for k in range(76, 85)), *(k / 1000 for k in range(97, 104)))  # of the scattered runs
 MINUTES = {"explicit": 0.05, "explicit, Courant 0.1": 0.25, "hht": 0.2}  # of a run of the small one
 FLAG = Parameter(negative="", show_default=False)
 
@@ -60,9 +63,12 @@ def plate(law: str, element: str, size: str, seed: int) -> Plate:
     return Plate(sample, material=material_from(law), law=SinkLaw(phi=limiter_of(law).phi), element=element)
 
 
-def event(law: str, element: str, size: str, seed: int, scheme: str) -> dict[str, Any]:
-    """An event of `END`: energies at its end, how far the crack has come, and what is lost on the way."""
-    body, courant = plate(law, element, size, seed), SCHEMES[scheme]
+def event(law: str, element: str, size: str, seed: int, scheme: str, *, courant: float | None = None) -> dict[str, Any]:
+    """An event of `END`: energies at its end, how far the crack has come, and what is lost on the way.
+
+    `courant` takes the place of that of the explicit scheme.
+    """
+    body, courant = plate(law, element, size, seed), courant or SCHEMES[scheme]
     state = body.onset
     state.begin_event(body.overshoot)
     integrator = body.hht(HHTControls()) if courant is None else body.explicit(ExplicitControls(courant=courant))
@@ -103,6 +109,13 @@ def plan(quick: bool) -> list[Planned]:
                     partial(event, law, element, size, seed, scheme),
                     60 * MINUTES[scheme] * (1 if size == SMALL else 15))
             for size, seed, scheme in runs for law, element in laws]
+
+
+def plan_scatter(quick: bool) -> list[Planned]:
+    """The event of one law on three meshes, at Courant numbers around the default and around that of the reference."""
+    return [Planned(f"{courant:g}, mesh {seed}",
+                    partial(event, *SCATTERED, SMALL, seed, "explicit", courant=courant), 3.0 / courant**0.7)
+            for courant in (COURANTS[:1] if quick else COURANTS) for seed in range(3)]
 
 
 def table(points: Points) -> list[str]:
@@ -161,12 +174,58 @@ def _picture(points: Points, path: Path) -> None:
         axes[0].legend(ncols=3)
 
 
-def strong_laws(*, quick: Annotated[bool, FLAG] = False, fresh: Annotated[bool, FLAG] = False,
-                out: Path = Path("results/study/strong_laws"), quiet: Annotated[bool, FLAG] = False) -> None:
-    """Run all laws at their own strength.
+def table_scatter(points: Points) -> list[str]:
+    """Of the Courant numbers around 0.8 and 0.1: D of each mesh, and the passage of 1 mm, with standard deviations of a
+    run; D and the passage of the mean mesh, with standard errors."""
+    lines = ["| Courant numbers | runs | $D$, mesh 0 | mesh 1 | mesh 2 | mean of the meshes | crack passes 1 mm [µs] |",
+             "|---" * 7 + "|"]
+    groups: dict[bool, dict[float, list[dict[str, Any]]]] = {True: {}, False: {}}
+    for key, point in points.items():
+        courant = float(key.split(",")[0])
+        groups[courant > 0.3].setdefault(courant, []).append(point)
+    for group in groups.values():
+        runs = [p for some in group.values() for p in some]
+        if not runs:
+            continue
+        meshes = {name: [np.array([p[name] for p in runs if p["seed"] == seed]) for seed in range(3)]
+                  for name in ("D", "passed_1mm_us")}
+        cells = [f"{min(group):g} to {max(group):g}", f"{len(runs)}",
+                 *(f"{D.mean():.1f} ± {_deviation(D):.1f}" for D in meshes["D"]),
+                 *(f"{np.mean([v.mean() for v in each]):.{digits}f} ± "
+                   f"{np.sqrt(sum(_deviation(v) ** 2 / len(v) for v in each)) / len(each):.{digits}f}"
+                   for each, digits in zip(meshes.values(), (2, 1)))]
+        lines.append("| " + " | ".join(cells) + " |")
+    return lines
+
+
+def _deviation(values: np.ndarray) -> float:
+    """Standard deviation of a population from a sample; 0 for a single value."""
+    return float(values.std(ddof=1)) if len(values) > 1 else 0.0
+
+
+def _picture_scatter(points: Points, path: Path) -> None:
+    """Dissipation of each run against its Courant number, a mark a mesh."""
+    with page(path, "", 1, 1, 2.7, width=3.6) as axes:
+        for seed in range(3):
+            mine = {float(key.split(",")[0]): p["D"] for key, p in points.items() if p["seed"] == seed}
+            axes[0].plot([*mine], [*mine.values()], "os^"[seed], markersize=4, fillstyle="none", label=f"mesh {seed}")
+        axes[0].set(xscale="log", xlabel="Courant number", ylabel="$D$ after 60 µs")
+        axes[0].legend()
+
+
+PARTS = {"laws": Part("laws", plan, _picture, table),
+         "scatter": Part("scatter", plan_scatter, _picture_scatter, table_scatter)}
+
+
+def strong_laws(*, only: Literal["laws", "scatter"] | None = None, quick: Annotated[bool, FLAG] = False,
+                fresh: Annotated[bool, FLAG] = False, out: Path = Path("results/study/strong_laws"),
+                quiet: Annotated[bool, FLAG] = False) -> None:
+    """Run all laws at their own strength, and one of them again and again.
 
     Parameters
     ----------
+    only
+        One part of the study: all laws, or how much the runs of one scatter.
     quick
         The small plate on one mesh, and no reference.
     fresh
@@ -180,7 +239,7 @@ def strong_laws(*, quick: Annotated[bool, FLAG] = False, fresh: Annotated[bool, 
     store = Store(out / "strong_laws.json", "strong_laws", fresh)
     try:
         with Display(quiet) as display:
-            run_parts(store, [Part("laws", plan, _picture, table)], quick, display)
+            run_parts(store, [PARTS[only]] if only else list(PARTS.values()), quick, display)
     finally:
         logging.disable(logging.NOTSET)
 
