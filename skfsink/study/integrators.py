@@ -146,8 +146,9 @@ def draw(points: Points, path: Path) -> None:
             ax.set_ylabel(f"relative error of the {label}")
         notes = axes[-1]
         notes.set_axis_off()
-        notes.legend(*axes[0].get_legend_handles_labels(), loc="upper left", fontsize=6.5, borderaxespad=0)
-        notes.text(0.48, 1.0, listed(key), transform=notes.transAxes, fontsize=6.5, va="top", linespacing=1.3)
+        notes.legend(*axes[0].get_legend_handles_labels(), loc="upper left", fontsize=6, borderaxespad=0,
+                     handlelength=1.5, handletextpad=0.4)
+        notes.text(0.55, 1.0, listed(key), transform=notes.transAxes, fontsize=6, va="top", linespacing=1.3)
 
 
 #: colour and marker of each family, by line

@@ -73,7 +73,7 @@ def summary(points: Points) -> list[dict[str, Any]]:
     """A row a law and method: mean `steps`, `rejected`, `cost` [s]; of each measure (mean, root mean square) errors.
 
     Errors are relative to the reference of the same mesh, those of the reference are its scatter about its mean. A
-    method of which a run failed has `failed`, what its message begins with, instead.
+    method of which runs failed has `failed`, how many, instead.
     """
     groups: dict[tuple[str, str], list[tuple[str, dict[str, Any]]]] = {}
     for key, point in points.items():
@@ -83,9 +83,9 @@ def summary(points: Points) -> list[dict[str, Any]]:
     for (law, method), runs in groups.items():
         row: dict[str, Any] = {"law": law, "method": method,
                                "cost": float(np.mean([point["cpu_s"] for _, point in runs]))}
-        failed = [point["failed"] for _, point in runs if "failed" in point]
+        failed = sum("failed" in point for _, point in runs)
         if failed:
-            row["failed"] = f"{failed[0].partition(':')[0]} ({len(failed)} of {len(runs)} runs)"
+            row["failed"] = f"{failed} of {len(runs)} runs fail"
             rows.append(row)
             continue
         for name in ("steps", "rejected"):
@@ -99,34 +99,37 @@ def summary(points: Points) -> list[dict[str, Any]]:
 
 
 COLOURS = {"aaa": "#33658a", "gent": "#a63d40"}
+MARKS = {"off": "x", "1e-04": "^", "2e-05": "*", "2e-06": "s"}
 
 
 def draw(points: Points, path: Path) -> None:
-    """Error against processor time, a panel a measure; a band is the scatter of the reference."""
+    """Error against processor time, a panel a measure; dotted lines are the scatter of the reference."""
     rows = summary(points)
-    with page(path, "Explicit steps that do not keep the energy are made again: error against cost", 1, 3, 3.2) as axes:
+    with page(path, "Steps that do not keep the energy are made again: error against cost", 2, 2, 5.6) as axes:
         for ax, (name, label) in zip(axes, MEASURES.items()):
             _panel(ax, rows, name)
             ax.set(xscale="log", yscale="log", xlabel="processor time (s)", ylabel=f"relative error of the {label}")
-        axes[0].legend(fontsize=6.5, loc="best")
+        axes[-1].set_axis_off()
+        axes[-1].legend(*axes[0].get_legend_handles_labels(), loc="upper left", borderaxespad=0)
 
 
 def _panel(ax: Axes, rows: list[dict[str, Any]], measure: str) -> None:
     for law in dict.fromkeys(row["law"] for row in rows):
-        mine = [row for row in rows if row["law"] == law]
-        good = [row for row in mine if "failed" not in row and row["method"] != "reference"]
-        cost, error = [row["cost"] for row in good], [row[measure][1] for row in good]
-        lost = [METHODS[row["method"]][1] for row in mine if "failed" in row]
-        note = f"; {', '.join(_text(t) for t in lost)}: fails" if lost else ""
-        ax.plot(cost, error, "o-", ms=4, linewidth=0.8, color=COLOURS[law], label=f"{law}{note}")
-        for row, x, y in zip(good, cost, error):
-            tolerance = METHODS[row["method"]][1]
-            ax.annotate(_text(tolerance), (x, y), xytext=(4, 4), textcoords="offset points", fontsize=6.5,
-                        color=COLOURS[law], fontweight="bold" if tolerance == DEFAULT else "normal")
-        reference = next(row for row in mine if row["method"] == "reference")
+        mine = {row["method"]: row for row in rows if row["law"] == law}
+        good = {method: row for method, row in mine.items() if "failed" not in row and method in MARKS}
+        ax.plot([row["cost"] for row in good.values()], [row[measure][1] for row in good.values()], linewidth=0.8,
+                color=COLOURS[law])
+        for method, mark in MARKS.items():
+            row, label = mine[method], f"{law}, {_text(METHODS[method][1])}"
+            if method in good:
+                ax.plot(row["cost"], row[measure][1], mark, ms=9 if mark == "*" else 5, linestyle="none",
+                        color=COLOURS[law], label=f"{label}{', default' if METHODS[method][1] == DEFAULT else ''}")
+            else:
+                ax.plot([], [], " ", label=f"{label}: {row['failed']}")
+        reference = mine["reference"]
         if "failed" not in reference and reference[measure][1] > 0.0:
             ax.axhline(reference[measure][1], color=COLOURS[law], linewidth=0.8, linestyle=":",
-                       label=f"{law}: scatter of the reference")
+                       label=f"{law}, scatter of the reference")
 
 
 def _text(tolerance: float) -> str:
@@ -147,9 +150,10 @@ def table(points: Points) -> list[str]:
                 if row["method"] == "reference" else
                 _text(tolerance) + (", default" if tolerance == DEFAULT else ""))
         if "failed" in row:
-            lines.append(f"| `{row['law']}` | {name} | failed: {row['failed']} | | {row['cost']:.2f} | | | |")
+            lines.append(f"| `{row['law']}` | {name} | {row['failed']} | | {row['cost']:.2f} | | | |")
             continue
-        errors = [f"{100 * mean:+.1f} % ({100 * square:.1f} %)" for mean, square in (row[m] for m in MEASURES)]
+        means = ["" if row["method"] == "reference" else f"{100 * row[name][0]:+.1f} % " for name in MEASURES]
+        errors = [f"{mean}({100 * row[name][1]:.1f} %)" for mean, name in zip(means, MEASURES)]
         lines.append(f"| `{row['law']}` | {name} | {row['steps']:.0f} | {row['rejected']:.0f} | {row['cost']:.2f} | "
                      + " | ".join(errors) + " |")
     return lines
