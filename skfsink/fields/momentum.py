@@ -200,9 +200,15 @@ class Momentum:
         """Data of the mass matrix of Eq. (28) on `pattern`."""
         return self.backend.mass(pattern, self.gamma)
 
-    def lumped_mass(self, floor: float) -> np.ndarray:
-        """Row sums (n,) [t; t/mm in 2D] of Eq. (28), at least `floor` times those of the intact solid."""
-        mass = self._lumped(self.gamma) if self.contact is None else self._mass
+    def lumped_mass(self, floor: float, factors: np.ndarray | None = None) -> np.ndarray:
+        """Row sums (n,) [t; t/mm in 2D] of Eq. (28), at least `floor` times those of the intact solid.
+
+        With `factors` (ne, 1) of the mass of elements.
+        """
+        if factors is not None:
+            mass = self._lumped(self.gamma * factors)
+        else:
+            mass = self._lumped(self.gamma) if self.contact is None else self._mass
         return np.maximum(mass, floor * self._intact)
 
     def _lumped(self, gamma: np.ndarray) -> np.ndarray:

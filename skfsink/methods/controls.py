@@ -28,6 +28,8 @@ class ExplicitControls:
     energy_tolerance: energy that a step may feed in or take out, of that of the body, in [0, 1]; else it is made again
         half as long. 0: no step is rejected, and one that feeds in energy calls for a new estimate of the limit.
     debris: "keep" or "remove" (delete pieces smaller than l that are cut off from all grips).
+    raised_mass: greatest share of the volume whose elements get more mass, lest they shorten the step, in [0, 0.5];
+        see :mod:`.raised_mass`.
     """
 
     courant: float = 0.8
@@ -37,6 +39,7 @@ class ExplicitControls:
     estimate_change: float = 0.1
     energy_tolerance: float = 2e-5
     debris: str = "keep"
+    raised_mass: float = 0.0
 
     def __post_init__(self) -> None:
         require("courant", self.courant, low=0, high=1, low_open=True)
@@ -46,6 +49,7 @@ class ExplicitControls:
         require("estimate_change", self.estimate_change, low=0, high=1, low_open=True, high_open=True)
         require("energy_tolerance", self.energy_tolerance, low=0, high=1)
         choose("debris", self.debris, DEBRIS)
+        require("raised_mass", self.raised_mass, low=0, high=0.5)
 
 
 @dataclass(frozen=True)

@@ -33,6 +33,7 @@ from ..fields.density import Density
 from ..fields.state import State
 from .controls import EventControls, ExplicitControls
 from .nodal_steps import half_square, kick, move, viscous_work
+from .raised_mass import raised_mass
 from .solve_interval import SolveInterval
 from .step_length import StepLength
 
@@ -55,6 +56,7 @@ class Explicit:
     ----------
     length, interval: of the steps, and between solves for gamma.
     dt: the current step [s].   estimates: frequency estimates made.   factorisations: none.
+    added_mass: of the smallest elements, over that of the intact body; see :mod:`.raised_mass`.
     reaction: (n, dim) internal and viscous force less the dead loads.
     """
 
@@ -74,6 +76,7 @@ class Explicit:
         self.interval = SolveInterval(body, self.controls.gamma_every)
         self.length = StepLength(self.momentum, self.free, self.controls, self.interval.longest)
         self._since_gamma = 0
+        self._factors, self.added_mass = raised_mass(self.momentum, self.controls.raised_mass)
         self._viscous: np.ndarray | None = None  # viscous force in `reaction`
         self._compression = 0.0
         self._zones: tuple[Zone, ...] = ()
@@ -102,7 +105,7 @@ class Explicit:
         self._next = np.empty_like(state.u), np.empty_like(state.u), np.empty_like(state.u)
 
     def _set_mass(self) -> None:
-        self.mass = self.momentum.lumped_mass(self._mass_floor)
+        self.mass = self.momentum.lumped_mass(self._mass_floor, self._factors)
         self._moving, contact = self._free, self.momentum.contact
         if contact is not None:
             self._moving = self._free & ~contact.massless

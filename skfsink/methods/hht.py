@@ -57,6 +57,8 @@ class HHT:
     dt: size of the next step [s].   rejected: steps given up.   iterations: Newton iterations made.
     """
 
+    added_mass = 0.0
+
     GROW = 1.5  # times the last step is the next one at the most
 
     def __init__(self, body: Body, controls: HHTControls | None = None, *, to_onset: bool = False) -> None:

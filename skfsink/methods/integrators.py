@@ -37,6 +37,10 @@ class Integrator(Protocol):
         """Steps that were tried and made again, shorter."""
 
     @property
+    def added_mass(self) -> float:
+        """Mass that elements have got, lest they shorten the step, of that of the intact body."""
+
+    @property
     def factorisations(self) -> int:
         """Numerical factorisations made so far."""
 

@@ -166,6 +166,7 @@ def cost_table(runs: Sequence[Run], labels: Sequence[str]) -> Table:
     rows.append(_row("wall time, in all", "s", [sum(wall.values()) if wall else None for wall in walls]))
     rows += [row("steps or passes", "", "cost", "steps"),
              row("steps rejected", "", "cost", "rejected_steps"), row("solves for γ", "", "cost", "gamma_solves"),
+             row("mass added to small elements, of that of the body", "", "event", "added_mass"),
              row("factorisations", "", "cost", "factorisations"), row("peak memory", "MB", "cost", "peak_rss_mb"),
              row("elements", "", "elements"), row("unknowns, displacement", "", "unknowns", "displacement"),
              row("unknowns, density", "", "unknowns", "density"),

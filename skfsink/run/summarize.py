@@ -54,6 +54,7 @@ def summarize(scene: Scene, simulation: Simulation) -> dict[str, Any]:
                   "mean_tip_speed_m_per_s": tracker.mean_speed() if dynamic else None,
                   "max_branches": tracker.max_branches, "separated": tracker.separated,
                   "duration_s": state.time if dynamic and onset else None,
+                  "added_mass": simulation.integrator.added_mass if dynamic and simulation.integrator else None,
                   **fragments(space, state.gamma, state.deleted, scene.sink_law.length_scale, SPENT)._asdict()},
         "energy": {"U_paper_at_arrival": crack.at_arrival.get("U_paper"), "U_paper_final": ledger.paper,
                    "D_sink_at_arrival": crack.at_arrival.get("D_sink"), "D_sink_final": ledger.sink,
