@@ -15,19 +15,22 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import meshio
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import MeshError, MissingExtra, require
+from .edge import Edge
+from .ring import Ring, joined, parted
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 Box = tuple[float, float, float, float]  # x0, x1, y0, y1 of a rectangle of fine elements
 Band = tuple[float, float, float, float, float]  # x0, y0, x1, y1 of a line, and the distance from it
 Distance = Callable[[float, float], float]
+Sizes = Callable[[float, float], float]  # element size at a point
 
 RIPPLE = 0.08  # root mean square of the relative ripple of the element size
 RIPPLE_LENGTH = 15  # its wavelength in fine element sizes
@@ -49,14 +52,6 @@ OPTIONS = {
     "Mesh.MeshSizeFromPoints": 0,
     "Mesh.MeshSizeFromCurvature": 0,
 }
-
-
-class Edge(NamedTuple):
-    """A piece of an outline, from where the one before ended to `end`: straight, or an arc through `via`."""
-
-    name: str
-    end: tuple[float, float]
-    via: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -99,16 +94,23 @@ def mesh_outline(outline: Sequence[Edge], size: SizeField, *, seed: int = 0,
 
     What gmsh makes of a size field is some per cent off, by an amount that depends on the seed, and may have
     a tiny element, which would spoil the time step. Meshes are therefore made, each with its own ripple and a
-    rescaled field, until one has as many elements as squares of the asked sizes and no bad element.
+    rescaled field, until one has as many elements as squares of the asked sizes and no bad element. Rings of elements
+    around arcs (see :mod:`.ring`) are added to it.
     """
     require("seed", seed, low=0)
     scale, best, least = TYPICAL_SCALE, None, math.inf
+    outside, rings = parted(outline, size.h)
+
+    def sizes(x: float, y: float) -> float:
+        there = [(x, y)] if image is None else [(x, y), tuple(image(np.array([[x, y]]))[0].tolist())]
+        return min([size(x, y), *(ring.size(*point, size.grading) for ring in rings for point in there)])
+
     with _gmsh_model() as gmsh:
-        names = _add_outline(gmsh, outline)
+        names = _add_outline(gmsh, outside, rings)
         for attempt in range(ATTEMPTS):
             ripple = _ripple(RIPPLE_LENGTH * size.h, seed, attempt, image=image)
-            points, quads, lines, triangles = _generate(gmsh, size, ripple, scale)
-            ratio, miss = _judge(points, quads, size)
+            points, quads, lines, triangles = _generate(gmsh, sizes, ripple, scale, names)
+            ratio, miss = _judge(points, quads, sizes, TOLERANCE if size.distance is None else LOOSE)
             if miss < least and not triangles:
                 best, least = (points, quads, lines), miss
             if least <= 1:
@@ -116,7 +118,10 @@ def mesh_outline(outline: Sequence[Edge], size: SizeField, *, seed: int = 0,
             scale *= math.sqrt(ratio)
     if best is None:
         raise MeshError("gmsh made no mesh of convex quadrilaterals only; try another seed")
-    return _to_meshio(*best, names)
+    points, quads, lines = best
+    for ring in rings:
+        points, quads = joined(ring, points, quads, lines)
+    return _to_meshio(points, quads, {name: lines[name] for name in dict.fromkeys(edge.name for edge in outline)})
 
 
 def scaled_jacobian(points: Array, quads: Indices) -> Array:
@@ -206,8 +211,11 @@ def _gmsh_model() -> Iterator[Any]:
         gmsh.finalize()
 
 
-def _add_outline(gmsh: Any, outline: Sequence[Edge]) -> dict[int, str]:
-    """Add the surface inside the outline to the model; returns the boundary names by curve tag."""
+def _add_outline(gmsh: Any, outline: Sequence[Edge], rings: Sequence[Ring]) -> dict[int, str]:
+    """Add the surface inside the outline to the model; returns the boundary names by curve tag.
+
+    Curves that rings of elements end at are divided as these are.
+    """
     occ = gmsh.model.occ
     corners = [occ.addPoint(*edge.end, 0) for edge in outline]
     names: dict[int, str] = {}
@@ -221,17 +229,33 @@ def _add_outline(gmsh: Any, outline: Sequence[Edge]) -> dict[int, str]:
         names[tag] = edge.name
     occ.addPlaneSurface([occ.addCurveLoop(list(names))])
     occ.synchronize()
+    for tag, count, growth in _divisions(outline, list(names), rings):
+        gmsh.model.mesh.setTransfiniteCurve(tag, count + 1, "Progression", growth)
     return names
 
 
-def _generate(gmsh: Any, size: SizeField, ripple: Callable[[float, float], float],
-              scale: float) -> tuple[Array, Indices, dict[int, Indices], int]:
-    """Mesh the model: points, counter-clockwise quads, line cells by curve tag, number of triangles left."""
+def _divisions(outline: Sequence[Edge], tags: Sequence[int], rings: Sequence[Ring]) -> Iterator[tuple[int, int, float]]:
+    """Number of elements, and ratio of the length of one and the next, on the curves that rings end at."""
+    ends = iter(rings)
+    for i, edge in enumerate(outline):
+        if edge.name or edge.via is None:
+            continue
+        ring = next(ends)
+        yield tags[i], ring.count, 1.0
+        if ring.seams[0] is None:
+            yield tags[i - 1], ring.layers, ring.growth
+        if ring.seams[1] is None:
+            yield tags[i + 1], ring.layers, 1 / ring.growth
+
+
+def _generate(gmsh: Any, size: Sizes, ripple: Callable[[float, float], float], scale: float,
+              names: Mapping[int, str]) -> tuple[Array, Indices, dict[str, Indices], int]:
+    """Mesh the model: points, counter-clockwise quads, line cells by name, number of triangles left."""
     mesh = gmsh.model.mesh
     mesh.clear()
     mesh.setSizeCallback(lambda dim, tag, x, y, z, _: scale * ripple(x, y) * size(x, y))
     for _, tag in gmsh.model.getEntities(1):
-        if gmsh.model.getType(1, tag) == "Circle":
+        if names[tag] and gmsh.model.getType(1, tag) == "Circle":
             x0, y0, _, x1, y1, _ = gmsh.model.getBoundingBox(1, tag)
             edges = gmsh.model.occ.getMass(1, tag) / size((x0 + x1) / 2, (y0 + y1) / 2)
             if edges < SHORT_ARC:  # an even number of them, at least four
@@ -244,13 +268,16 @@ def _generate(gmsh: Any, size: SizeField, ripple: Callable[[float, float], float
     triangles, quads = (index[mesh.getElementsByType(kind)[1]] for kind in (2, 3))
     quads = quads.reshape(-1, 4)
     quads = np.where(_areas(points[quads])[:, None] < 0, quads[:, ::-1], quads)
-    curves = [tag for _, tag in gmsh.model.getEntities(1)]
-    lines = {tag: index[mesh.getElements(1, tag)[2][0]].reshape(-1, 2) for tag in curves}
+    blocks: dict[str, list[Indices]] = {}
+    for _, tag in gmsh.model.getEntities(1):
+        if names[tag]:
+            blocks.setdefault(names[tag], []).append(index[mesh.getElements(1, tag)[2][0]].reshape(-1, 2))
+    lines = {name: np.concatenate(found) for name, found in blocks.items()}
     return points, quads, lines, len(triangles) // 3
 
 
-def _judge(points: Array, quads: Indices, size: SizeField) -> tuple[float, float]:
-    """Number of elements over that of squares of the asked sizes; badness (1: good enough)."""
+def _judge(points: Array, quads: Indices, size: Sizes, allowed: float) -> tuple[float, float]:
+    """Number of elements over that of squares of the asked sizes; badness (1: good enough), with what it may be off."""
     cells = points[quads]
     wanted = np.array([size(x, y) for x, y, _ in cells.mean(axis=1).tolist()])
     areas, diagonals = _areas(cells), np.linalg.norm(cells[:, 2:] - cells[:, :2], axis=2)
@@ -258,7 +285,6 @@ def _judge(points: Array, quads: Indices, size: SizeField) -> tuple[float, float
     smallest, jacobian = np.min(areas / diagonals.max(axis=1) / wanted), scaled_jacobian(points, quads).min()
     if smallest <= 0 or jacobian <= 0:
         return ratio, math.inf
-    allowed = TOLERANCE if size.distance is None else LOOSE
     return ratio, max(abs(ratio - 1) / allowed, SMALLEST / smallest, LEAST_JACOBIAN / jacobian)
 
 
@@ -268,8 +294,7 @@ def _areas(cells: Array) -> Array:
     return (one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]) / 2
 
 
-def _to_meshio(points: Array, quads: Indices, lines: Mapping[int, Indices],
-               names: Mapping[int, str]) -> meshio.Mesh:
+def _to_meshio(points: Array, quads: Indices, lines: Mapping[str, Indices]) -> meshio.Mesh:
     """Quadrilaterals and named line cells, numbered along strips (for locality)."""
     x, y, _ = points[quads].mean(axis=1).T
     quads = quads[np.lexsort((y, np.floor(x / np.sqrt(16 * np.median(_areas(points[quads]))))))]
@@ -280,8 +305,8 @@ def _to_meshio(points: Array, quads: Indices, lines: Mapping[int, Indices],
     grid = 2.0 ** (math.ceil(math.log2(np.abs(points).max())) - 28)  # coordinates of 28 bits compress well
     points = np.round(points[order] / grid) * grid
     blocks: list[Indices] = [index[block] for block in lines.values()]
-    owner = np.repeat(np.array([names[tag] for tag in lines]), [len(block) for block in blocks])
-    sets = {name: [np.zeros(0, int), np.flatnonzero(owner == name)] for name in dict.fromkeys(names.values())}
+    owner = np.repeat(np.array(list(lines)), [len(block) for block in blocks])
+    sets = {name: [np.zeros(0, int), np.flatnonzero(owner == name)] for name in lines}
     return meshio.Mesh(points, [("quad", index[quads]), ("line", np.concatenate(blocks))], cell_sets=sets)
 
 
