@@ -1,7 +1,7 @@
+from .gmsh_model import has_gmsh as has_gmsh
 from .outline import Edge as Edge
 from .outline import SizeField as SizeField
 from .outline import completed as completed
-from .outline import has_gmsh as has_gmsh
 from .outline import mesh_outline as mesh_outline
 from .sample import Sample as Sample
 from .sample import file_sample as file_sample

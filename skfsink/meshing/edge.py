@@ -5,28 +5,31 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-__all__ = ["Edge", "Point", "circle"]
+__all__ = ["ASPECT", "Edge", "Point", "circle"]
 
 Point = tuple[float, float]
+
+ASPECT = 4.0  # of the elements along an arc: length over thickness
 
 
 class Edge(NamedTuple):
     """A piece of an outline, from where the one before ended to `end`: straight, or an arc through `via`.
 
-    Elements along an arc around which the body lies, such as the tip of a notch, are of size `h` [mm] if there is one:
-    see :mod:`.ring`.
+    An arc around which the body lies, such as the tip of a notch, gets rings of elements (see :mod:`.ring`) if it has
+    a size `h` [mm]: that of the elements along it, which are `aspect` times as long as they are thick.
     """
 
     name: str
     end: Point
     via: Point | None = None
     h: float | None = None
+    aspect: float = ASPECT
 
 
 def circle(start: Point, via: Point, end: Point) -> tuple[Point, float, float, float]:
-    """Centre and radius of the arc from `start` through `via` to `end`, its angle at the start, and what it turns by.
+    """Centre and radius of the arc from `start` through `via` to `end`, its angle at the start, and its turn.
 
-    Angles are in radian; the turn is positive if counter-clockwise.
+    Angles are in radian; the turn is positive if counter-clockwise. The three points must not be on a line.
     """
     (ax, ay), (bx, by), (cx, cy) = start, via, end
     d = 2 * (ax * (by - cy) + bx * (cy - ay) + cx * (ay - by))

@@ -12,25 +12,25 @@ triangles are recombined and subdivided into quadrilaterals; a slight ripple of 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import meshio
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import MeshError, MissingExtra, require
+from ..errors import MeshError, require
 from .edge import Edge
-from .ring import Ring, joined, parted
+from .gmsh_model import Blocks, Sizes, add_outline, areas, generate, gmsh_model
+from .ring import joined, parted
+
+__all__ = ["Band", "Box", "Distance", "Edge", "SizeField", "completed", "mesh_outline", "scaled_jacobian"]
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 Box = tuple[float, float, float, float]  # x0, x1, y0, y1 of a rectangle of fine elements
 Band = tuple[float, float, float, float, float]  # x0, y0, x1, y1 of a line, and the distance from it
 Distance = Callable[[float, float], float]
-Sizes = Callable[[float, float], float]  # element size at a point
 
 RIPPLE = 0.08  # root mean square of the relative ripple of the element size
 RIPPLE_LENGTH = 15  # its wavelength in fine element sizes
@@ -40,18 +40,6 @@ LOOSE = 0.05  # the same along a corridor, which has no number to meet
 SMALLEST = 0.25  # least area over longest diagonal, in element sizes (a square has 0.71)
 LEAST_JACOBIAN = 0.5
 ATTEMPTS = 12  # meshes that are made to meet the last three
-SHORT_ARC = 12  # arcs of fewer edges get equal edges
-OPTIONS = {
-    "General.Terminal": 0,
-    "General.NumThreads": 1,
-    "Mesh.Algorithm": 6,  # frontal Delaunay
-    "Mesh.RecombineAll": 1,
-    "Mesh.RecombinationAlgorithm": 2,  # full-quad: recombine at twice the size, then subdivide
-    "Mesh.Smoothing": 10,
-    "Mesh.MeshSizeExtendFromBoundary": 0,
-    "Mesh.MeshSizeFromPoints": 0,
-    "Mesh.MeshSizeFromCurvature": 0,
-}
 
 
 @dataclass(frozen=True)
@@ -96,32 +84,43 @@ def mesh_outline(outline: Sequence[Edge], size: SizeField, *, seed: int = 0,
     a tiny element, which would spoil the time step. Meshes are therefore made, each with its own ripple and a
     rescaled field, until one has as many elements as squares of the asked sizes and no bad element. Rings of elements
     around arcs (see :mod:`.ring`) are added to it.
+
+    Raises
+    ------
+    MeshError
+        No mesh has convex quadrilaterals only, or rings of elements cannot be laid around an arc.
+    MissingExtra
+        There is no gmsh.
     """
     require("seed", seed, low=0)
     scale, best, least = TYPICAL_SCALE, None, math.inf
     outside, rings = parted(outline, size.h)
 
     def sizes(x: float, y: float) -> float:
-        there = [(x, y)] if image is None else [(x, y), tuple(image(np.array([[x, y]]))[0].tolist())]
-        return min([size(x, y), *(ring.size(*point, size.grading) for ring in rings for point in there)])
+        if not rings:
+            return size(x, y)
+        there = np.array([[x, y]])
+        there = there if image is None else np.concatenate([there, image(there)])
+        return min([size(x, y), *(ring.size(a, b, size.grading) for ring in rings for a, b in there.tolist())])
 
-    with _gmsh_model() as gmsh:
-        names = _add_outline(gmsh, outside, rings)
+    with gmsh_model() as gmsh:
+        names = add_outline(gmsh, outside, rings)
         for attempt in range(ATTEMPTS):
             ripple = _ripple(RIPPLE_LENGTH * size.h, seed, attempt, image=image)
-            points, quads, lines, triangles = _generate(gmsh, sizes, ripple, scale, names)
+            points, quads, blocks, triangles = generate(gmsh, sizes, ripple, scale, names)
             ratio, miss = _judge(points, quads, sizes, TOLERANCE if size.distance is None else LOOSE)
             if miss < least and not triangles:
-                best, least = (points, quads, lines), miss
+                best, least = (points, quads, blocks), miss
             if least <= 1:
                 break
             scale *= math.sqrt(ratio)
     if best is None:
         raise MeshError("gmsh made no mesh of convex quadrilaterals only; try another seed")
-    points, quads, lines = best
+    points, quads, blocks = best
     for ring in rings:
-        points, quads = joined(ring, points, quads, lines)
-    return _to_meshio(points, quads, {name: lines[name] for name in dict.fromkeys(edge.name for edge in outline)})
+        points, quads, more = joined(ring, points, quads)
+        blocks = blocks + more
+    return _to_meshio(points, quads, blocks, list(dict.fromkeys(edge.name for edge in outline)))
 
 
 def scaled_jacobian(points: Array, quads: Indices) -> Array:
@@ -161,7 +160,7 @@ def completed(part: meshio.Mesh, seam: str, image: Callable[[Array], Array],
     copy[:, :2] = image(copy[:, :2])
     joined = np.concatenate([points, copy])
     other, lines_there = number[quads], number[lines]
-    if _areas(joined[other[:1]])[0] < 0:
+    if areas(joined[other[:1]])[0] < 0:
         other, lines_there = other[:, ::-1], lines_there[:, ::-1]
     kept = np.unique(np.concatenate([*members.values()]))
     index = np.full(len(lines), -1)
@@ -192,128 +191,29 @@ def _ripple(length: float, *seeds: int, waves: int = 8,
     return lambda x, y: (factor(x, y) + factor(*image(np.array([[x, y]]))[0])) / 2
 
 
-@contextmanager
-def _gmsh_model() -> Iterator[Any]:
-    """The gmsh module with an empty model and the options of this module."""
-    try:
-        import gmsh
-    except (ImportError, OSError) as error:  # OSError: a system library that gmsh needs is missing
-        raise MissingExtra(f"making a mesh needs gmsh, which cannot be imported ({error})") from error
-    if gmsh.isInitialized():
-        raise MeshError("gmsh is in use; call gmsh.finalize() before making a mesh")
-    gmsh.initialize(readConfigFiles=False, interruptible=False)
-    try:
-        for option, value in OPTIONS.items():
-            gmsh.option.setNumber(option, value)
-        gmsh.model.add("sample")
-        yield gmsh
-    finally:
-        gmsh.finalize()
-
-
-def _add_outline(gmsh: Any, outline: Sequence[Edge], rings: Sequence[Ring]) -> dict[int, str]:
-    """Add the surface inside the outline to the model; returns the boundary names by curve tag.
-
-    Curves that rings of elements end at are divided as these are.
-    """
-    occ = gmsh.model.occ
-    corners = [occ.addPoint(*edge.end, 0) for edge in outline]
-    names: dict[int, str] = {}
-    for i, edge in enumerate(outline):
-        if edge.via is None:
-            tag = occ.addLine(corners[i - 1], corners[i])
-        else:
-            via = occ.addPoint(*edge.via, 0)
-            tag = occ.addCircleArc(corners[i - 1], via, corners[i], center=False)
-            occ.remove([(0, via)])
-        names[tag] = edge.name
-    occ.addPlaneSurface([occ.addCurveLoop(list(names))])
-    occ.synchronize()
-    for tag, count, growth in _divisions(outline, list(names), rings):
-        gmsh.model.mesh.setTransfiniteCurve(tag, count + 1, "Progression", growth)
-    return names
-
-
-def _divisions(outline: Sequence[Edge], tags: Sequence[int], rings: Sequence[Ring]) -> Iterator[tuple[int, int, float]]:
-    """Number of elements, and ratio of the length of one and the next, on the curves that rings end at."""
-    ends = iter(rings)
-    for i, edge in enumerate(outline):
-        if edge.name or edge.via is None:
-            continue
-        ring = next(ends)
-        yield tags[i], ring.count, 1.0
-        if ring.seams[0] is None:
-            yield tags[i - 1], ring.layers, ring.growth
-        if ring.seams[1] is None:
-            yield tags[i + 1], ring.layers, 1 / ring.growth
-
-
-def _generate(gmsh: Any, size: Sizes, ripple: Callable[[float, float], float], scale: float,
-              names: Mapping[int, str]) -> tuple[Array, Indices, dict[str, Indices], int]:
-    """Mesh the model: points, counter-clockwise quads, line cells by name, number of triangles left."""
-    mesh = gmsh.model.mesh
-    mesh.clear()
-    mesh.setSizeCallback(lambda dim, tag, x, y, z, _: scale * ripple(x, y) * size(x, y))
-    for _, tag in gmsh.model.getEntities(1):
-        if names[tag] and gmsh.model.getType(1, tag) == "Circle":
-            x0, y0, _, x1, y1, _ = gmsh.model.getBoundingBox(1, tag)
-            edges = gmsh.model.occ.getMass(1, tag) / size((x0 + x1) / 2, (y0 + y1) / 2)
-            if edges < SHORT_ARC:  # an even number of them, at least four
-                mesh.setTransfiniteCurve(tag, 2 * max(2, math.ceil(edges / 2)) + 1)
-    mesh.generate(2)
-    tags, coordinates, _ = mesh.getNodes()
-    index = np.zeros(int(tags.max()) + 1, dtype=np.int64)
-    index[tags] = np.arange(len(tags))
-    points = coordinates.reshape(-1, 3)
-    triangles, quads = (index[mesh.getElementsByType(kind)[1]] for kind in (2, 3))
-    quads = quads.reshape(-1, 4)
-    quads = np.where(_areas(points[quads])[:, None] < 0, quads[:, ::-1], quads)
-    blocks: dict[str, list[Indices]] = {}
-    for _, tag in gmsh.model.getEntities(1):
-        if names[tag]:
-            blocks.setdefault(names[tag], []).append(index[mesh.getElements(1, tag)[2][0]].reshape(-1, 2))
-    lines = {name: np.concatenate(found) for name, found in blocks.items()}
-    return points, quads, lines, len(triangles) // 3
-
-
 def _judge(points: Array, quads: Indices, size: Sizes, allowed: float) -> tuple[float, float]:
     """Number of elements over that of squares of the asked sizes; badness (1: good enough), with what it may be off."""
     cells = points[quads]
     wanted = np.array([size(x, y) for x, y, _ in cells.mean(axis=1).tolist()])
-    areas, diagonals = _areas(cells), np.linalg.norm(cells[:, 2:] - cells[:, :2], axis=2)
-    ratio = len(quads) / float(np.sum(areas / wanted**2))
-    smallest, jacobian = np.min(areas / diagonals.max(axis=1) / wanted), scaled_jacobian(points, quads).min()
+    area, diagonals = areas(cells), np.linalg.norm(cells[:, 2:] - cells[:, :2], axis=2)
+    ratio = len(quads) / float(np.sum(area / wanted**2))
+    smallest, jacobian = np.min(area / diagonals.max(axis=1) / wanted), scaled_jacobian(points, quads).min()
     if smallest <= 0 or jacobian <= 0:
         return ratio, math.inf
     return ratio, max(abs(ratio - 1) / allowed, SMALLEST / smallest, LEAST_JACOBIAN / jacobian)
 
 
-def _areas(cells: Array) -> Array:
-    """Areas of quadrilaterals given by their corners, positive if counter-clockwise."""
-    one, two = cells[:, 2] - cells[:, 0], cells[:, 3] - cells[:, 1]
-    return (one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]) / 2
-
-
-def _to_meshio(points: Array, quads: Indices, lines: Mapping[str, Indices]) -> meshio.Mesh:
+def _to_meshio(points: Array, quads: Indices, blocks: Blocks, names: Sequence[str]) -> meshio.Mesh:
     """Quadrilaterals and named line cells, numbered along strips (for locality)."""
     x, y, _ = points[quads].mean(axis=1).T
-    quads = quads[np.lexsort((y, np.floor(x / np.sqrt(16 * np.median(_areas(points[quads]))))))]
+    quads = quads[np.lexsort((y, np.floor(x / np.sqrt(16 * np.median(areas(points[quads]))))))]
     used, first = np.unique(quads, return_index=True)
     order = used[np.argsort(first)]
     index = np.full(len(points), -1)
     index[order] = np.arange(len(order))
     grid = 2.0 ** (math.ceil(math.log2(np.abs(points).max())) - 28)  # coordinates of 28 bits compress well
     points = np.round(points[order] / grid) * grid
-    blocks: list[Indices] = [index[block] for block in lines.values()]
-    owner = np.repeat(np.array(list(lines)), [len(block) for block in blocks])
-    sets = {name: [np.zeros(0, int), np.flatnonzero(owner == name)] for name in lines}
-    return meshio.Mesh(points, [("quad", index[quads]), ("line", np.concatenate(blocks))], cell_sets=sets)
-
-
-def has_gmsh() -> bool:
-    """Whether meshes can be made here."""
-    try:
-        import gmsh  # noqa: F401
-    except (ImportError, OSError):
-        return False
-    return True
+    owner = np.repeat([name for name, _ in blocks], [len(lines) for _, lines in blocks])
+    sets = {name: [np.zeros(0, int), np.flatnonzero(owner == name)] for name in names}
+    lines = index[np.concatenate([lines for _, lines in blocks])]
+    return meshio.Mesh(points, [("quad", index[quads]), ("line", lines)], cell_sets=sets)

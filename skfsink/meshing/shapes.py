@@ -1,8 +1,10 @@
 """The samples' shapes: outlines, where their elements are fine, and the sizes of the committed meshes.
 
 Each sample has a function that returns its mesh; its keyword arguments are the sample's dimensions [mm], the element
-sizes and the `seed`. Three-dimensional samples are meshed as a section, which :mod:`.sweeping` turns into hexahedra.
-The meshes in `cases/<sample>/meshes` are from `python -m skfsink.meshing.shapes <sample> [--mesh M3]` and gmsh 4.15.2.
+sizes and the `seed`. `h_tip` is the size of the elements along the round tips of notches, around which elements are
+laid in rings (see :mod:`.ring`); with None, the default, there are none, and elements there are of size `h`.
+Three-dimensional samples are meshed as a section, which :mod:`.sweeping` turns into hexahedra. The meshes in
+`cases/<sample>/meshes` are from `python -m skfsink.meshing.shapes <sample> [--mesh M3]` and gmsh 4.15.2.
 """
 
 from __future__ import annotations
@@ -29,8 +31,9 @@ Image = Callable[[np.ndarray], np.ndarray]
 
 
 def single_edge_notch_mesh(*, side: float = 4.0, notch: float = 1.0, notch_width: float = 0.1,
-                           h: float = 0.1 / 3, h_coarse: float = 0.11, half_height: float = 1.7,
-                           symmetry: str = "none", distance: Distance | None = None, seed: int = 0) -> meshio.Mesh:
+                           h: float = 0.1 / 3, h_coarse: float = 0.11, h_tip: float | None = None,
+                           half_height: float = 1.7, symmetry: str = "none", distance: Distance | None = None,
+                           seed: int = 0) -> meshio.Mesh:
     """Mesh the square plate [0, side]^2 with a round-tipped notch from the left edge at mid-height.
 
     `notch` is the length of the notch up to its tip, the top of a semicircle of diameter `notch_width`. The
@@ -44,13 +47,13 @@ def single_edge_notch_mesh(*, side: float = 4.0, notch: float = 1.0, notch_width
     require("half_height", half_height, "mm", low=0, low_open=True)
     middle = side / 2
     corridor = (notch - 1.5 * notch_width, side, middle - half_height, middle + half_height)
-    return _edge_notched(side, notch, notch_width, SizeField(h, h_coarse, (corridor,), distance=distance), symmetry,
-                         seed)
+    size = SizeField(h, h_coarse, (corridor,), distance=distance)
+    return _edge_notched(side, _Notch(notch, notch_width, h_tip), size=size, symmetry=symmetry, seed=seed)
 
 
 def simple_shear_mesh(*, side: float = 4.0, notch: float = 2.0, notch_width: float = 0.1, h: float = 0.025,
-                      h_coarse: float = 0.11, half_width: float = 0.5, symmetry: str = "mirror",
-                      distance: Distance | None = None, seed: int = 0) -> meshio.Mesh:
+                      h_coarse: float = 0.11, h_tip: float | None = None, half_width: float = 0.5,
+                      symmetry: str = "mirror", distance: Distance | None = None, seed: int = 0) -> meshio.Mesh:
     """Mesh the square plate [0, side]^2 with a round-tipped notch from the left edge to the middle.
 
     Sheared to the right at its top, the plate cracks from the tip down to the right. Elements are of size `h` around
@@ -63,14 +66,14 @@ def simple_shear_mesh(*, side: float = 4.0, notch: float = 2.0, notch_width: flo
     middle = side / 2
     tip: Box = (notch - 0.25, notch + 0.35, middle - 0.35, middle + 0.35)
     path: Band = (notch, middle, notch + 0.75 * middle, 0, half_width)
-    return _edge_notched(side, notch, notch_width, SizeField(h, h_coarse, (tip,), (path,), distance=distance), symmetry,
-                         seed)
+    size = SizeField(h, h_coarse, (tip,), (path,), distance=distance)
+    return _edge_notched(side, _Notch(notch, notch_width, h_tip), size=size, symmetry=symmetry, seed=seed)
 
 
 def symmetric_double_edge_notch_mesh(*, side: float = 3.0, notch: float = 0.5, notch_width: float = 0.1,
-                                     h: float = 0.025, h_coarse: float = 0.11, half_height: float = 0.7,
-                                     symmetry: str = "turn", distance: Distance | None = None,
-                                     seed: int = 0) -> meshio.Mesh:
+                                     h: float = 0.025, h_coarse: float = 0.11, h_tip: float | None = None,
+                                     half_height: float = 0.7, symmetry: str = "turn",
+                                     distance: Distance | None = None, seed: int = 0) -> meshio.Mesh:
     """Mesh the square plate [0, side]^2 with equal notches from the left and the right edge at mid-height.
 
     Fine within `half_height` of mid-height between the notches. The right half is the left one turned by half a turn,
@@ -86,14 +89,14 @@ def symmetric_double_edge_notch_mesh(*, side: float = 3.0, notch: float = 0.5, n
         def image(points: np.ndarray) -> np.ndarray:
             return points * (-1, 1) + (side, 0)
 
-        half = mesh_outline(_left_half(side, notch, notch_width, middle), _even(size, image), seed=seed)
+        half = mesh_outline(_left_half(side, _Notch(notch, notch_width, h_tip), middle), _even(size, image), seed=seed)
         return completed(half, "seam", image, {"left": "right"})
-    return _double_edge_notched(side, notch, notch_width, 0.0, size=size, symmetry=symmetry, seed=seed)
+    return _double_edge_notched(side, _Notch(notch, notch_width, h_tip), 0.0, size=size, symmetry=symmetry, seed=seed)
 
 
 def asymmetric_double_edge_notch_mesh(*, side: float = 4.0, notch: float = 0.6, notch_width: float = 0.1,
                                       offset: float = 1.0, h: float = 0.025, h_coarse: float = 0.11,
-                                      half_height: float = 1.35, symmetry: str = "turn",
+                                      h_tip: float | None = None, half_height: float = 1.35, symmetry: str = "turn",
                                       distance: Distance | None = None, seed: int = 0) -> meshio.Mesh:
     """Mesh the square plate [0, side]^2 with a notch from each side, the right one higher by `offset`.
 
@@ -106,7 +109,8 @@ def asymmetric_double_edge_notch_mesh(*, side: float = 4.0, notch: float = 0.6, 
     require("half_height", half_height, "mm", low=0, low_open=True)
     fine = (0.0, side, side / 2 - half_height, side / 2 + half_height)
     size = SizeField(h, h_coarse, (fine,), distance=distance)
-    return _double_edge_notched(side, notch, notch_width, offset, size=size, symmetry=symmetry, seed=seed)
+    return _double_edge_notched(side, _Notch(notch, notch_width, h_tip), offset, size=size, symmetry=symmetry,
+                                seed=seed)
 
 
 def dog_bone_mesh(*, length: float = 10.0, gauge_length: float = 4.0, gauge_width: float = 1.5, grip_width: float = 3.0,
@@ -139,7 +143,7 @@ def dog_bone_mesh(*, length: float = 10.0, gauge_length: float = 4.0, gauge_widt
 
 def cylindrical_shell_mesh(*, inner_radius: float = 1.9, thickness: float = 0.1, length: float = 5.0,
                            notch: float = 1.0, notch_width: float = 0.1, h: float = 0.025, h_coarse: float = 0.11,
-                           half_height: float = 1.2, distance: Distance | None = None,
+                           h_tip: float | None = None, half_height: float = 1.2, distance: Distance | None = None,
                            seed: int = 0) -> meshio.Mesh:
     """Mesh the unrolled mid-surface of a half cylinder, [0, pi r] x [0, length], with a slit in its middle.
 
@@ -152,7 +156,7 @@ def cylindrical_shell_mesh(*, inner_radius: float = 1.9, thickness: float = 0.1,
     require("half_height", half_height, "mm", low=0, low_open=True)
     r, crown, tip = notch_width / 2, arc / 2, arc / 2 - notch / 2
     outline = [Edge("bottom", (crown, 0)), Edge("seam", (crown, middle - r)), Edge("notch", (tip + r, middle - r)),
-               Edge("notch", (tip + r, middle + r), via=(tip, middle)), Edge("notch", (crown, middle + r)),
+               Edge("notch", (tip + r, middle + r), via=(tip, middle), h=h_tip), Edge("notch", (crown, middle + r)),
                Edge("seam", (crown, length)), Edge("top", (0, length)), Edge("edge", (0, 0))]
     corridor = (0.0, arc, middle - half_height, middle + half_height)
 
@@ -189,11 +193,18 @@ def check_shell(inner_radius: float, thickness: float, length: float, notch: flo
     require("notch", notch, "mm", low=notch_width, high=arc, low_open=True, high_open=True)
 
 
-def _notch_from_left(notch: float, width: float, y: float) -> list[Edge]:
-    """From the left edge above the notch to the left edge below it."""
-    r = width / 2
-    return [Edge("left", (0, y + r)), Edge("notch", (notch - r, y + r)),
-            Edge("notch", (notch - r, y - r), via=(notch, y)), Edge("notch", (0, y - r))]
+class _Notch(NamedTuple):
+    """Length up to the tip and width of a notch, and the size of the elements along its tip, None for no rings [mm]."""
+
+    length: float
+    width: float
+    h: float | None
+
+    def from_left(self, y: float) -> list[Edge]:
+        """From the left edge above the notch, at height `y`, to the left edge below it."""
+        r, tip = self.width / 2, self.length
+        return [Edge("left", (0, y + r)), Edge("notch", (tip - r, y + r)),
+                Edge("notch", (tip - r, y - r), via=(tip, y), h=self.h), Edge("notch", (0, y - r))]
 
 
 def check_two_notches(side: float, notch: float, notch_width: float) -> None:
@@ -202,10 +213,10 @@ def check_two_notches(side: float, notch: float, notch_width: float) -> None:
     require("notch", notch, "mm", low=notch_width / 2, high=side / 2, low_open=True, high_open=True)
 
 
-def _left_half(side: float, notch: float, width: float, y: float) -> list[Edge]:
+def _left_half(side: float, notch: _Notch, y: float) -> list[Edge]:
     """Left half of a square plate with a notch from the left edge at height `y`."""
     return [Edge("bottom", (side / 2, 0)), Edge("seam", (side / 2, side)), Edge("top", (0, side)),
-            *_notch_from_left(notch, width, y), Edge("left", (0, 0))]
+            *notch.from_left(y), Edge("left", (0, 0))]
 
 
 def _even(size: SizeField, image: Image) -> SizeField:
@@ -220,24 +231,24 @@ def _even(size: SizeField, image: Image) -> SizeField:
     return replace(size, distance=nearer)
 
 
-def _edge_notched(side: float, notch: float, width: float, size: SizeField, symmetry: str, seed: int) -> meshio.Mesh:
+def _edge_notched(side: float, notch: _Notch, *, size: SizeField, symmetry: str, seed: int) -> meshio.Mesh:
     """Square plate with a notch from the left edge at mid-height; with `symmetry` "mirror" of equal halves."""
-    middle, r = side / 2, width / 2
+    middle, r, tip = side / 2, notch.width / 2, notch.length
     if symmetry == "mirror":
         def image(points: np.ndarray) -> np.ndarray:
             return points * (1, -1) + (0, side)
 
         s = r * math.sqrt(0.5)
-        lower = [Edge("bottom", (side, 0)), Edge("right", (side, middle)), Edge("seam", (notch, middle)),
-                 Edge("notch", (notch - r, middle - r), via=(notch - r + s, middle - s)),
+        lower = [Edge("bottom", (side, 0)), Edge("right", (side, middle)), Edge("seam", (tip, middle)),
+                 Edge("notch", (tip - r, middle - r), via=(tip - r + s, middle - s), h=notch.h),
                  Edge("notch", (0, middle - r)), Edge("left", (0, 0))]
         return completed(mesh_outline(lower, _even(size, image), seed=seed), "seam", image, {"bottom": "top"})
     outline = [Edge("bottom", (side, 0)), Edge("right", (side, side)), Edge("top", (0, side)),
-               *_notch_from_left(notch, width, middle), Edge("left", (0, 0))]
+               *notch.from_left(middle), Edge("left", (0, 0))]
     return mesh_outline(outline, size, seed=seed)
 
 
-def _double_edge_notched(side: float, notch: float, width: float, offset: float, *, size: SizeField, symmetry: str,
+def _double_edge_notched(side: float, notch: _Notch, offset: float, *, size: SizeField, symmetry: str,
                          seed: int) -> meshio.Mesh:
     """Square plate with notches from the left and the right edge, the right one higher by `offset`."""
     left, right = (side - offset) / 2, (side + offset) / 2
@@ -246,14 +257,14 @@ def _double_edge_notched(side: float, notch: float, width: float, offset: float,
         return side - points
 
     if symmetry == "turn":
-        half = mesh_outline(_left_half(side, notch, width, left), _even(size, turned), seed=seed, image=turned)
+        half = mesh_outline(_left_half(side, notch, left), _even(size, turned), seed=seed, image=turned)
         return completed(half, "seam", turned, {"left": "right", "top": "bottom", "bottom": "top"})
-    r, tip = width / 2, side - notch
+    r, tip = notch.width / 2, side - notch.length
     return mesh_outline(
         [Edge("bottom", (side, 0)), Edge("right", (side, right - r)), Edge("notch", (tip + r, right - r)),
-         Edge("notch", (tip + r, right + r), via=(tip, right)), Edge("notch", (side, right + r)),
-         Edge("right", (side, side)), Edge("top", (0, side)), *_notch_from_left(notch, width, left),
-         Edge("left", (0, 0))], size, seed=seed)
+         Edge("notch", (tip + r, right + r), via=(tip, right), h=notch.h), Edge("notch", (side, right + r)),
+         Edge("right", (side, side)), Edge("top", (0, side)), *notch.from_left(left), Edge("left", (0, 0))],
+        size, seed=seed)
 
 
 # --- the committed meshes ---

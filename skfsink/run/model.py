@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import OutputError, ParameterError
-from ..meshing.outline import has_gmsh
+from ..meshing.gmsh_model import has_gmsh
 from ..scene.case import Case
 from ..scene.options import Options
 from ..system.shipped import data_folder

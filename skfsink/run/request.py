@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import MeshError, OutputError, ParameterError
+from ..meshing.gmsh_model import has_gmsh
 from ..meshing.kept_mesh import mesh_name, origin
-from ..meshing.outline import has_gmsh
 from ..scene.case import Case, shared_parameters
 from ..scene.options import NOT_PHYSICS, Options
 from ..scene.scene import Scene
