@@ -92,7 +92,7 @@ def _divisions(outline: Sequence[Edge], tags: Sequence[int], rings: Sequence[Rin
         if edge.name != INNER or edge.via is None:
             continue
         ring = next(ends)
-        yield tags[i], ring.count, 1.0
+        yield tags[i], ring.elements, 1.0
         if ring.seams[0] is None:
             yield tags[i - 1], ring.layers, ring.growth
         if ring.seams[1] is None:

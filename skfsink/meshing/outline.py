@@ -97,11 +97,8 @@ def mesh_outline(outline: Sequence[Edge], size: SizeField, *, seed: int = 0,
     outside, rings = parted(outline, size.h)
 
     def sizes(x: float, y: float) -> float:
-        if not rings:
-            return size(x, y)
-        there = np.array([[x, y]])
-        there = there if image is None else np.concatenate([there, image(there)])
-        return min([size(x, y), *(ring.size(a, b, size.grading) for ring in rings for a, b in there.tolist())])
+        there = [[x, y]] if image is None or not rings else [[x, y], *image(np.array([[x, y]])).tolist()]
+        return min([size(x, y), *(ring.size(a, b, size.grading) for ring in rings for a, b in there)])
 
     with gmsh_model() as gmsh:
         names = add_outline(gmsh, outside, rings)

@@ -37,7 +37,7 @@ class Ring(NamedTuple):
     arc: its name.   seams: those of the straight pieces of the outline that the rings end at, at its start and end, or
     None where they end inside of the body.
     centre: of the arc.   radius: of the arc [mm].   start, turn: angles of the arc [rad]; the body is outside of it.
-    count, layers: elements along the arc and across, even numbers.
+    elements, layers: numbers of elements along the arc and across, even.
     growth: ratio of the thickness of one layer and the one before.   outer: radius of the outermost [mm].
     """
 
@@ -47,7 +47,7 @@ class Ring(NamedTuple):
     radius: float
     start: float
     turn: float
-    count: int
+    elements: int
     layers: int
     growth: float
     outer: float
@@ -55,7 +55,7 @@ class Ring(NamedTuple):
     @property
     def step(self) -> float:
         """Angle of an element [rad]."""
-        return abs(self.turn) / self.count
+        return abs(self.turn) / self.elements
 
     def at(self, radius: float, share: float) -> Point:
         """Point at a distance from the centre and a share of the turn."""
@@ -69,16 +69,21 @@ class Ring(NamedTuple):
         return np.hypot(x, y), ((turned + NEAR) % (2 * math.pi) - NEAR) / abs(self.turn)
 
     def size(self, x: float, y: float, grading: float) -> float:
-        """Size of the elements at a point [mm]: that along the rings beside them, growing by `grading` outside."""
+        """Size of the elements at a point [mm]: that of those of the rings beside it, growing by `grading` outside.
+
+        It is the geometric mean of their length and their thickness.
+        """
         away = math.hypot(x - self.centre[0], y - self.centre[1])
         beside = min(max(away, self.radius), self.outer)
-        return beside * self.step + grading * max(0.0, away - self.outer)
+        first = (self.outer - self.radius) * (self.growth - 1) / (self.growth**self.layers - 1)
+        thickness = first + (self.growth - 1) * (beside - self.radius)
+        return math.sqrt(beside * self.step * thickness) + grading * max(0.0, away - self.outer)
 
     def quads(self) -> tuple[Array, Indices]:
         """Points (layers+1, count+1, 2), from the arc outwards, and elements (layers*count, 4), by number of these."""
         thickness = np.concatenate([[0.0], np.cumsum(self.growth ** np.arange(self.layers))])
         radii = self.radius + (self.outer - self.radius) * thickness / thickness[-1]
-        angles = self.start + self.turn * np.arange(self.count + 1) / self.count
+        angles = self.start + self.turn * np.arange(self.elements + 1) / self.elements
         directions = np.stack([np.cos(angles), np.sin(angles)], axis=1)
         points = np.array(self.centre) + radii[:, None, None] * directions
         number = np.arange(points.shape[0] * points.shape[1]).reshape(points.shape[:2])
