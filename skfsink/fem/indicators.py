@@ -2,12 +2,29 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from .space import Space
 
-__all__ = ["alternation", "element_pressure", "greatest_stretch", "inverted", "mean_density", "size_near", "turning",
-           "turnings"]
+__all__ = ["Corner", "alternation", "corner_near", "element_pressure", "greatest_stretch", "inverted", "mean_density",
+           "size_near", "turning", "turnings"]
+
+
+class Corner(NamedTuple):
+    """A node (2D) or an edge (3D) at which the body's surface turns inwards.
+
+    Attributes
+    ----------
+    angle: by which it turns [degrees].   place: [mm], (dim,).
+    radius: of the circle that the facets beside it are chords of [mm].   thickness: of their elements [mm].
+    """
+
+    angle: float
+    place: np.ndarray
+    radius: float
+    thickness: float
 
 
 def turning(space: Space) -> tuple[float, np.ndarray]:
@@ -50,6 +67,32 @@ def turnings(space: Space) -> tuple[np.ndarray, np.ndarray]:
     around[np.bincount(where, np.concatenate(on_surface), len(places)) == 0] = 0.0
     nodes = places[:, None] if dim == 2 else np.stack(np.divmod(places, space.n_nodes), axis=1)
     return nodes, np.degrees(around) - 180.0
+
+
+def corner_near(space: Space, element: int) -> Corner | None:
+    """Where the surface turns inwards the most: at the element, or else at those that share a node with it.
+
+    None where it does not, by a degree at least.
+    """
+    nodes, angles = turnings(space)
+    around = np.isin(space.conn, space.conn[element]).any(axis=1)
+    for near in (space.conn[element], np.unique(space.conn[around])):
+        here = np.flatnonzero(np.isin(nodes, near).all(axis=1) & (angles > 1.0))
+        if here.size:
+            break
+    else:
+        return None
+    worst = int(here[np.argmax(angles[here])])
+    corner = space.X[nodes[worst]]
+    place, breadth = corner.mean(axis=0), 1.0 if space.dim == 2 else float(np.linalg.norm(corner[1] - corner[0]))
+    facets = space.mesh.boundary_facets()
+    members = space.mesh.facets[:, facets].T
+    beside = np.isin(members, nodes[worst]).sum(axis=1) == nodes.shape[1]
+    far = [space.X[np.setdiff1d(facet, nodes[worst])].mean(axis=0) for facet in members[beside]]
+    lengths = np.linalg.norm(np.array(far) - place, axis=1)
+    thickness = space.V[space.mesh.f2t[0, facets[beside]]] / (lengths * breadth)
+    return Corner(float(angles[worst]), place, float(lengths.mean() / np.radians(angles[worst])),
+                  float(thickness.mean()))
 
 
 def _key(nodes: np.ndarray, n: int) -> np.ndarray:

@@ -32,11 +32,10 @@ from ..run.display import Display
 from .chart import page
 from .part import Part, Planned, Points
 from .plate import Plate
-from .rates import extrapolated
 from .speed_accuracy import run_parts
 from .store import Store
 
-__all__ = ["Tip", "notch", "plate_mesh"]
+__all__ = ["ONSET", "Tip", "notch", "plate_mesh"]
 
 SIDE, NOTCH = 2.0, 0.5  # of the plate [mm]
 L = 0.1                 # length scale of the sink [mm]
@@ -146,3 +145,125 @@ def tips(quick: bool) -> list[Tip]:
 def plan(quick: bool) -> list[Planned]:
     """A point a notch and mesh."""
     return [Planned(tip.key, tip, 5.0) for tip in tips(quick)]
+
+
+# --- what comes out ---
+NEAR = 0.1  # thickness over radius below which openings are taken to be linear in it
+
+
+def reference(points: Sequence[dict[str, Any]]) -> float:
+    """Opening at the onset for elements of no thickness [mm]: where a straight line through those that have less than
+    `NEAR` of the radius begins, of meshes with rings."""
+    near = [p for p in points if p["rings"] and p["thickness"] < NEAR]
+    thickness, opening = np.array([(p["thickness"], p["opening_mm"]) for p in near]).T
+    return float(np.polyfit(thickness, opening, 1)[1])
+
+
+def delays(points: Points) -> dict[tuple[str, str], list[dict[str, Any]]]:
+    """The points of each law and radius, with their `kind` of mesh, `size`, `rings`, and `late`: the delay over the
+    :func:`reference` of their law and radius."""
+    groups: dict[tuple[str, str], list[dict[str, Any]]] = {}
+    for key, point in points.items():
+        law, radius, kind, size, _ = key.split("/")
+        if "failed" not in point:
+            groups.setdefault((law, radius), []).append({**point, "kind": kind, "size": size, "rings": "rings" in kind})
+    for group in groups.values():
+        true = reference(group)
+        for point in group:
+            point["late"] = point["opening_mm"] / true - 1
+    return groups
+
+
+def curve(points: Points) -> tuple[float, float, float]:
+    """Factor and exponent of the delay as a power of thickness over radius, for all points, and their scatter about it.
+
+    The scatter is the standard deviation of the logarithm.
+    """
+    found = [p for group in delays(points).values() for p in group if p["late"] > 0 and p["thickness"] < 1]
+    x, y = np.log([(p["thickness"], p["late"]) for p in found]).T
+    exponent, factor = np.polyfit(x, y, 1)
+    return float(np.exp(factor)), float(exponent), float(np.std(y - exponent * x - factor))
+
+
+COLOURS = {("aaa", "0.05"): "#33658a", ("aaa", "0.1"): "#55a630", ("aaa", "0.025"): "#e09f3e",
+           ("gent", "0.05"): "#a63d40"}
+MARKS = {"unstructured": "o", "rings 1": "s", "rings 2": "D", "rings 4": "^", "rings 8": "*"}
+
+
+def draw(points: Points, path: Path) -> None:
+    """Delay of each onset against where the first Gauss point is, and against the number of elements."""
+    groups = delays(points)
+    factor, exponent, _ = curve(points)
+    with page(path, "How late the onset at a notch is", 1, 2, 3.6) as axes:
+        for ax, x in zip(axes, ("thickness", "per_radius")):
+            for kind, mark in MARKS.items():
+                for name, group in groups.items():
+                    mine = [p for p in group if p["kind"] == kind and p["late"] > 0]
+                    scale = FIRST if x == "thickness" else 1.0
+                    ax.plot([scale * p[x] for p in mine], [100 * p["late"] for p in mine], mark, ms=3.5, linestyle="",
+                            color=COLOURS[name], fillstyle="none" if kind == "unstructured" else "full")
+            ax.set(xscale="log", yscale="log", ylabel="delay of the onset (% of the opening)")
+        t = np.geomspace(0.01, 1.5, 50)
+        axes[0].plot(FIRST * t, 100 * factor * t**exponent, "k-", linewidth=0.8, label="power law")
+        axes[0].set_xlabel("first Gauss point below the surface / radius")
+        axes[1].set_xlabel("elements in a radius along the tip")
+        for (law, radius), colour in COLOURS.items():
+            if (law, radius) in groups:
+                axes[0].plot([], [], "-", color=colour, label=f"{law}, radius {radius} mm")
+        for kind, mark in MARKS.items():
+            if any(p["kind"] == kind for group in groups.values() for p in group):
+                axes[1].plot([], [], mark, color="k", ms=3.5, fillstyle="none" if kind == "unstructured" else "full",
+                             label=kind.replace("rings ", "rings, aspect "))
+        for ax in axes:
+            ax.legend(fontsize=6)
+
+
+def table(points: Points) -> list[str]:
+    """A row a law, radius and kind of mesh: size, elements in a radius, thickness, opening and delay, with scatter."""
+    lines = ["| law, radius [mm] | elements at the tip | meshes | elements in a radius | thickness / radius | "
+             "opening [mm] | late |", "|---" * 7 + "|"]
+    for (law, radius), group in delays(points).items():
+        lines.append(f"| `{law}`, {radius} | extrapolated | | | 0 | {reference(group):.4f} | 0 |")
+        kinds = sorted({(p["kind"], float(p["size"])) for p in group}, key=lambda k: ([*MARKS].index(k[0]), k[1]))
+        for kind, size in kinds:
+            mine = [p for p in group if (p["kind"], float(p["size"])) == (kind, size)]
+            opening, late = (np.array([p[name] for p in mine]) for name in ("opening_mm", "late"))
+            scatter = [f" ± {values.std(ddof=1):.{digits}f}" if len(mine) > 1 else ""
+                       for values, digits in ((opening, 4), (100 * late, 1))]
+            lines.append(
+                f"| | {kind.replace('rings ', 'rings, aspect ')}, l/{size:g} | {len(mine)} | "
+                f"{np.mean([p['per_radius'] for p in mine]):.1f} | {np.mean([p['thickness'] for p in mine]):.3f} | "
+                f"{opening.mean():.4f}{scatter[0]} | {100 * late.mean():.1f}{scatter[1]} % |")
+    factor, exponent, scatter_of_all = curve(points)
+    return [*lines, "", f"delay = {factor:.3f} (thickness / radius)^{exponent:.2f}, within a factor of "
+            f"{math.exp(scatter_of_all):.2f} (standard deviation)"]
+
+
+ONSET = Part("onset", plan, draw, table)
+
+
+def notch(*, quick: Annotated[bool, FLAG] = False, fresh: Annotated[bool, FLAG] = False,
+          out: Path = Path("results/study/notch"), quiet: Annotated[bool, FLAG] = False) -> None:
+    """Measure how late an onset is that begins at a notch, for the elements at its tip.
+
+    Parameters
+    ----------
+    quick
+        Five meshes, in a minute.
+    fresh
+        Measure all points anew; without it, those in the folder are kept.
+    out
+        Folder for the figures and the picture.
+    quiet
+        Show no progress.
+    """
+    logging.getLogger("skfsink").setLevel(logging.ERROR)
+    store = Store(out / "notch.json", "notch", fresh)
+    with Display(quiet) as display:
+        run_parts(store, [ONSET], quick, display)
+
+
+if __name__ == "__main__":
+    from ..cli.program import command
+
+    command(notch, package="study")

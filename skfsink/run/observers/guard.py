@@ -20,6 +20,7 @@ from ...material.regions import by_element
 from .observer import Observer
 from .overlap import overlap
 from .range import COARSE, check_onset
+from .tip import check_tip
 from .view import View
 
 __all__ = ["Guard"]
@@ -30,7 +31,7 @@ log = logging.getLogger(__name__)
 class Guard(Observer):
     """Watches one run of a scene, against the tolerance `balance_tolerance` of its ledger.
 
-    Memory: evenness and energy at the onset, failed elements at the last step, and how deep faces overlapped: what
+    Memory: evenness, energy and notch at the onset, failed elements at the last step, how deep faces overlapped: what
     `check_onset`, `even`, `check_step`, `check_record`, `check_stress`, `check_overlap` and `check_end` say depends on
     them.
 
@@ -42,11 +43,12 @@ class Guard(Observer):
     ----------
     scale: elastic energy at the onset, to which the others are compared.
     evenness: share of the body that was loaded about as much as its weakest point at the onset.
+    notch: what :func:`.check_tip` says of the notch at which the body begins to fail; empty before, and without one.
     dissolved: whether a body that was loaded evenly has failed everywhere at once.
     overlaps: depth [mm] of an overlap of faces when it was first seen, and the greatest; empty before.
     """
 
-    kept = ("scale", "evenness", "dissolved", "overlaps")
+    kept = ("scale", "evenness", "notch", "dissolved", "overlaps")
     FLAT = 0.2             # J below which a live point is close to being turned inside out
     LIVE = 0.5             # gamma of a point that must not be inside out
     NEGATIVE = -1e-6       # gamma below which a nodal density is no rounding
@@ -59,6 +61,7 @@ class Guard(Observer):
     def __init__(self, every: float) -> None:
         self.every = every
         self.scale = self.evenness = 0.0
+        self.notch: dict[str, Any] = {}
         self.dissolved = False
         self.overlaps: list[float] = []
         self._deleted = -1   # elements at the last step
@@ -134,8 +137,10 @@ class Guard(Observer):
         InstabilityError
             The ledger of the loading does not close, or a live point is inside out.
         """
-        self.scale, self.evenness = state.ledger.elastic, self._even_share(state)
+        loaded = self._loaded(state)
+        self.scale, self.evenness = state.ledger.elastic, self._even_share(loaded)
         check_onset(self.scene, state)
+        self.notch = check_tip(self.space, int(np.argmax(loaded)))
         error, allowed = state.ledger.error(state.ledger.elastic), self.scene.controls.balance_tolerance
         if not error <= allowed:
             raise InstabilityError(f"the ledger of the loading is open by {error:.2%} of the stored energy, allowed "
@@ -143,13 +148,17 @@ class Guard(Observer):
                                    f"--balance-tolerance")
         self._check_shape(state)
 
-    def _even_share(self, state: State) -> float:
-        """Share of the volume whose W/Phi is at least `EVEN` times the greatest one."""
+    def _loaded(self, state: State) -> np.ndarray:
+        """Greatest W/Phi of each element, (ne,)."""
         phi = by_element(self.space.n_elements, self.scene.sink_law.phi, self.scene.regions,
                          lambda region: region.sink_law.phi)
-        ratio = state.W_max.max(axis=1) / phi
+        ratio: np.ndarray = state.W_max.max(axis=1) / phi
+        return ratio
+
+    def _even_share(self, loaded: np.ndarray) -> float:
+        """Share of the volume whose W/Phi, `loaded` (ne,), is at least `EVEN` times the greatest one."""
         V = self.space.V
-        return float(V[ratio >= self.EVEN[0] * ratio.max()].sum() / V.sum())
+        return float(V[loaded >= self.EVEN[0] * loaded.max()].sum() / V.sum())
 
     @property
     def even(self) -> bool:

@@ -16,7 +16,7 @@ from ...fields.state import State
 from ...material.regions import Region
 from ...scene.scene import Scene
 
-__all__ = ["COARSE", "check_onset", "check_pressure", "check_scene"]
+__all__ = ["COARSE", "SHARP", "check_onset", "check_pressure", "check_scene"]
 
 log = logging.getLogger(__name__)
 

@@ -1,0 +1,63 @@
+"""How well a mesh resolves the notch at which a body begins to fail, and how late that makes the onset.
+
+The sink sees the energy at Gauss points, the first of which lie below the surface, where there is less of it: the
+thicker the elements at the tip, the later the onset. How much was measured: `docs/notches.md`.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from typing import Any
+
+from ...errors import place_text
+from ...fem.indicators import corner_near
+from ...fem.space import Space
+from .range import SHARP
+
+__all__ = ["LATE", "check_tip", "late", "thickness_for"]
+
+log = logging.getLogger(__name__)
+
+CURVE = 0.5, 0.9  # delay = CURVE[0] * (thickness of the elements / radius of the tip) ** CURVE[1]
+LATE = 0.03         # of the opening, past which an onset is warned of
+ALONG = 6           # elements in a radius along a tip, with rings around it, which the curve finds enough
+
+
+def late(share: float) -> float:
+    """By how much of the opening an onset is late, for elements of a thickness, as a share of the radius of the tip."""
+    return CURVE[0] * share ** CURVE[1]
+
+
+def thickness_for(delay: float) -> float:
+    """Thickness of elements, as a share of the radius of the tip, with which an onset is late by `delay`."""
+    return float((delay / CURVE[0]) ** (1 / CURVE[1]))
+
+
+def check_tip(space: Space, element: int) -> dict[str, Any]:
+    """Warn where the onset, in an element, is that of a mesh that does not resolve the notch there.
+
+    Returns
+    -------
+    Of the notch `radius_mm`, `elements_per_radius`, `thickness_mm` of its elements, `late`, the share of the opening by
+    which the onset is expected to be late, and `place_mm`; radius and late are None at a sharp corner. Empty where the
+    surface does not turn inwards.
+    """
+    corner = corner_near(space, element)
+    if corner is None:
+        return {}
+    radius, sharp = corner.radius, corner.angle > SHARP
+    delay = late(corner.thickness / radius)
+    figures = {"radius_mm": None if sharp else radius, "elements_per_radius": math.degrees(1.0) / corner.angle,
+               "thickness_mm": corner.thickness, "late": None if sharp else delay, "place_mm": corner.place.tolist()}
+    if sharp:
+        log.warning("the body begins to fail at a sharp corner, which turns by %.0f degrees (above %g), at %s mm: the "
+                    "onset hangs on the size of the elements there; round it", corner.angle, SHARP,
+                    place_text(corner.place))
+    elif delay > LATE:
+        log.warning("the body begins to fail at a notch of radius %.2g mm, with %.2g elements in a radius, at %s mm: "
+                    "the onset may be late by %.0f %% of the opening (above %g); make elements there %.2g mm large, or "
+                    "lay rings of %.2g mm around the tip (h_tip of a sample, h of an Edge)", radius,
+                    figures["elements_per_radius"], place_text(corner.place), 100 * delay, 100 * LATE,
+                    thickness_for(LATE) * radius, radius / ALONG)
+    return figures

@@ -1,0 +1,175 @@
+"""The guard of notches that a mesh does not resolve: what it measures, when it speaks, and what it is based on."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pytest
+import skfem
+from guarded import NOTCHED, Watched, scene, simulation
+
+from skfsink.fem.indicators import corner_near
+from skfsink.fem.space import Space
+from skfsink.meshing.sample import Sample, mesh_sample
+from skfsink.meshing.sweeping import swept
+from skfsink.run.observers import tip
+from skfsink.run.simulate import Loaded
+from skfsink.run.summarize import summarize
+from skfsink.scene.controls import Controls
+from skfsink.study import notch
+from skfsink.study.blocks import block
+from skfsink.study.meshes import load_plate
+
+RADIUS = 0.2
+
+
+def holed(along: int, across: int, reach: float = 2.5) -> Space:
+    """A quarter of a ring of radius 0.2 mm, so many elements along and across, out to so many radii."""
+    mesh = skfem.MeshQuad.init_tensor(np.linspace(0, 1, across + 1), np.linspace(0, 1, along + 1))
+    away, angle = RADIUS * (1 + (reach - 1) * mesh.p[0]), math.pi / 2 * mesh.p[1]
+    return Space(skfem.MeshQuad(np.array([away * np.cos(angle), away * np.sin(angle)]), mesh.t))
+
+
+def at(space: Space, *place: float) -> int:
+    """The element that is nearest to a place."""
+    return int(np.argmin(np.linalg.norm(space.X[space.conn].mean(axis=1) - place, axis=1)))
+
+
+@pytest.mark.parametrize("along, across", [(4, 6), (10, 6), (10, 20)])
+@pytest.mark.parametrize("layers", [0, 2])
+def test_radius_and_thickness_are_those_of_the_tip(along: int, across: int, layers: int) -> None:
+    """Fails if the radius, the angle or the thickness of a round notch is wrong, in the plane or through a sheet."""
+    space = holed(along, across)
+    if layers:
+        p, t = space.mesh.p, space.mesh.t
+        section = meshio.Mesh(np.column_stack([p.T, np.zeros(p.shape[1])]), [("quad", t.T)])
+        space = mesh_sample("sheet", swept(section, 0.1, layers)).space
+    middle = RADIUS / math.sqrt(2)
+    corner = corner_near(space, at(space, *([middle, middle] if not layers else [middle, middle, 0.03])))
+    assert corner is not None
+    assert corner.angle == pytest.approx(90 / along)
+    assert corner.radius == pytest.approx(RADIUS, rel=0.02)
+    assert corner.thickness == pytest.approx(1.5 * RADIUS / across, rel=0.2)
+    assert np.hypot(*corner.place[:2]) == pytest.approx(RADIUS)
+
+
+def test_surfaces_that_do_not_turn_inwards_have_no_corner() -> None:
+    """Fails if a plane side, a convex corner, the outside of a ring or the inside of a body is taken for a notch."""
+    plain, ring = block(15).space, holed(10, 6)
+    for space, place in ((plain, (0, 0.5)), (plain, (0, 0)), (plain, (0.5, 0.5)), (ring, (0.35, 0.35))):
+        assert corner_near(space, at(space, *place)) is None
+
+
+def failing(sample: Sample, *place: float) -> Watched:
+    """A guard that has looked at an onset in the element at a place."""
+    watched = Watched(scene(sample))
+    watched.state.W_max[at(sample.space, *place)] = 1.0
+    watched.guard.check_onset(watched.state)
+    return watched
+
+
+def ring_sample(along: int, across: int, reach: float = 2.5) -> Sample:
+    space = holed(along, across, reach)
+    return Sample("ring", space, {"top": np.flatnonzero(space.X[:, 0] < 1e-9),
+                                  "bottom": np.flatnonzero(space.X[:, 1] < 1e-9)})
+
+
+def test_notch_that_is_not_resolved_is_warned_of(caplog: pytest.LogCaptureFixture) -> None:
+    """Fails if the delay of an onset is not told, is told of a fine mesh, or the message lacks place, delay or cure."""
+    middle = RADIUS / math.sqrt(2)
+    fine = failing(ring_sample(12, 60), middle, middle)
+    assert not caplog.messages and 0 < fine.guard.notch["late"] < tip.LATE
+    coarse = failing(ring_sample(4, 6), middle, middle)
+    (text,) = caplog.messages
+    figures = coarse.guard.notch
+    assert "notch of radius 0.2 mm, with 2.5 elements in a radius, at (0." in text
+    assert f"late by {100 * figures['late']:.0f} % of the opening (above 3)" in text
+    assert "rings of 0.033 mm around the tip (h_tip" in text
+    assert figures["radius_mm"] == pytest.approx(RADIUS, rel=0.02)
+    assert figures["elements_per_radius"] == pytest.approx(8 / math.pi)
+    assert figures["late"] == pytest.approx(tip.late(figures["thickness_mm"] / figures["radius_mm"]))
+
+
+def test_elements_that_are_named_as_a_cure_are_one(caplog: pytest.LogCaptureFixture) -> None:
+    """Fails if a mesh with the elements that the warning asks for is warned of again."""
+    share, middle = tip.thickness_for(tip.LATE), RADIUS / math.sqrt(2)
+    assert tip.late(share) == pytest.approx(tip.LATE)
+    across = math.ceil(0.5 / (0.9 * share))
+    failing(ring_sample(math.ceil(math.pi / 2 / share), across, 1.5), middle, middle)
+    assert not caplog.messages
+
+
+def test_sharp_corner_is_warned_of(caplog: pytest.LogCaptureFixture) -> None:
+    """Fails if an onset at a corner without a radius is given a delay, or passes for resolved."""
+    watched = failing(block(15, notch=0.4, width=0.06), 0.42, 0.5)
+    assert [t for t in caplog.messages if "begins to fail at a sharp corner, which turns by 90 degrees" in t]
+    assert watched.guard.notch["late"] is None and watched.guard.notch["radius_mm"] is None
+
+
+def test_evenly_loaded_body_without_a_notch_is_not_warned_of(caplog: pytest.LogCaptureFixture) -> None:
+    """Fails if a body without a notch is said to have one."""
+    assert failing(block(15), 0.0, 0.5).guard.notch == {} and not caplog.messages
+
+
+def test_notch_is_in_the_summary_and_in_a_checkpoint(tmp_path: Path) -> None:
+    """Fails if summary.json does not say how the notch is resolved, or a resumed run has forgotten it."""
+    of = dataclasses.replace(NOTCHED.scene, controls=Controls(event_time=1e-7, overshoot=0.01, checkpoint_every=1e6))
+    sim = simulation(of, tmp_path)
+    sim.run(Loaded(NOTCHED.onset))
+    found = summarize(sim.scene, sim)["onset"]["notch"]
+    assert found["late"] is None and found["elements_per_radius"] == pytest.approx(2 / math.pi)
+    memory = sim.guard.memory()
+    assert memory["notch"] == found
+
+
+@pytest.mark.parametrize("name, late", [("plate0", (0.15, 0.5))])
+def test_committed_plate_is_late(name: str, late: tuple[float, float]) -> None:
+    """Fails if the delay of the study's plate, l/2, is not the tens of per cent that were measured."""
+    space = load_plate(name).space
+    corner = corner_near(space, at(space, 0.5, 1.0))
+    assert corner is not None and late[0] < tip.late(corner.thickness / corner.radius) < late[1]
+
+
+# --- the study ---
+def test_curve_is_that_of_the_study(tmp_path: Path) -> None:
+    """Fails if the guard uses another curve than the stored points give, or the page shows other figures."""
+    docs = Path(__file__).parents[1] / "docs"
+    stored = json.loads((docs / "images" / "notch.json").read_text(encoding="utf-8"))
+    points = {key.removeprefix("onset/"): point for key, point in stored["points"].items()}
+    assert {p.key for p in notch.plan(False)} == points.keys()
+    factor, exponent, _ = notch.curve(points)
+    assert (pytest.approx(factor, rel=0.01), pytest.approx(exponent, rel=0.01)) == tip.CURVE
+    text = (docs / "notches.md").read_text(encoding="utf-8")
+    assert not [line for line in notch.table(points) if line not in text]
+    notch.draw(points, tmp_path / "notch.png")
+    assert (tmp_path / "notch.png").stat().st_size > 5e4
+
+
+def test_reference_is_where_the_line_through_fine_rings_begins() -> None:
+    """Fails if unstructured or coarse meshes move the reference, or delays are not those over it."""
+    def point(thickness: float, late: float) -> dict[str, float]:
+        return {"thickness": thickness, "opening_mm": 0.2 * (1 + late), "per_radius": 1 / thickness}
+
+    points = {f"aaa/0.05/rings 4/{1 / t:g}/0": point(t, 0.5 * t) for t in (0.02, 0.04, 0.08)}
+    points |= {"aaa/0.05/rings 4/2/0": point(0.5, 0.9), "aaa/0.05/unstructured/20/0": point(0.05, 0.9),
+               "gent/0.05/rings 4/9/0": point(0.05, 0.4), "gent/0.05/rings 4/10/0": point(0.04, 0.32)}
+    found = notch.delays(points)
+    assert notch.reference(found["aaa", "0.05"]) == pytest.approx(0.2)
+    assert [p["late"] for p in found["aaa", "0.05"]] == pytest.approx([0.01, 0.02, 0.04, 0.9, 0.9])
+    assert notch.reference(found["gent", "0.05"]) == pytest.approx(0.2)
+
+
+@pytest.mark.slow
+def test_a_point_of_the_study() -> None:
+    """Fails if a mesh of the study does not have the elements at the tip that it asks for."""
+    pytest.importorskip("gmsh")
+    found = notch.Tip(6, 4.0)()
+    assert found["per_radius"] == pytest.approx(10 / math.pi, rel=0.03)
+    assert found["thickness"] == pytest.approx(math.pi / 10 / 4, rel=0.3)
+    assert found["weakest"] == pytest.approx(found["thickness"], rel=0.05) and abs(found["direction"]) < 45
+    assert found["opening_mm"] == pytest.approx(0.0896, rel=0.03)
