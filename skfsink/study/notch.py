@@ -175,14 +175,20 @@ def delays(points: Points) -> dict[tuple[str, str], list[dict[str, Any]]]:
 
 
 def curve(points: Points) -> tuple[float, float, float]:
-    """Factor and exponent of the delay as a power of thickness over radius, for all points, and their scatter about it.
-
-    The scatter is the standard deviation of the logarithm.
-    """
-    found = [p for group in delays(points).values() for p in group if p["late"] > 0 and p["thickness"] < 1]
+    """Factor and exponent of the delay as a power of thickness over radius, for all meshes with rings; and the scatter
+    of these about it, the standard deviation of the logarithm."""
+    found = [p for group in delays(points).values() for p in group if p["rings"]]
     x, y = np.log([(p["thickness"], p["late"]) for p in found]).T
     exponent, factor = np.polyfit(x, y, 1)
     return float(np.exp(factor)), float(exponent), float(np.std(y - exponent * x - factor))
+
+
+def unstructured(points: Points) -> tuple[float, float]:
+    """Mean and standard deviation of the delay less that of the :func:`curve`, of unstructured meshes."""
+    factor, exponent, _ = curve(points)
+    off = [p["late"] - factor * p["thickness"] ** exponent for group in delays(points).values() for p in group
+           if not p["rings"]]
+    return float(np.mean(off)), float(np.std(off, ddof=1)) if len(off) > 1 else 0.0
 
 
 COLOURS = {("aaa", "0.05"): "#33658a", ("aaa", "0.1"): "#55a630", ("aaa", "0.025"): "#e09f3e",
@@ -234,9 +240,11 @@ def table(points: Points) -> list[str]:
                 f"| | {kind.replace('rings ', 'rings, aspect ')}, l/{size:g} | {len(mine)} | "
                 f"{np.mean([p['per_radius'] for p in mine]):.1f} | {np.mean([p['thickness'] for p in mine]):.3f} | "
                 f"{opening.mean():.4f}{scatter[0]} | {100 * late.mean():.1f}{scatter[1]} % |")
-    factor, exponent, scatter_of_all = curve(points)
-    return [*lines, "", f"delay = {factor:.3f} (thickness / radius)^{exponent:.2f}, within a factor of "
-            f"{math.exp(scatter_of_all):.2f} (standard deviation)"]
+    factor, exponent, about = curve(points)
+    mean, beside = unstructured(points)
+    return [*lines, "", f"Rings: delay = {factor:.2f} (thickness / radius)^{exponent:.2f}, within a factor of "
+            f"{math.exp(about):.2f}; unstructured meshes lie {100 * mean:+.1f} ± {100 * beside:.1f} % of the opening "
+            "beside it."]
 
 
 ONSET = Part("onset", plan, draw, table)
