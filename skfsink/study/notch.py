@@ -175,19 +175,17 @@ def delays(points: Points) -> dict[tuple[str, str], list[dict[str, Any]]]:
 
 
 def curve(points: Points) -> tuple[float, float, float]:
-    """Factor and exponent of the delay as a power of thickness over radius, for all meshes with rings; and the scatter
-    of these about it, the standard deviation of the logarithm."""
+    """Delay over the thickness of the elements, as a share of the radius, of all meshes with rings: its mean, the
+    factor within which they lie (one standard deviation), and the exponent if the delay is a power of the thickness."""
     found = [p for group in delays(points).values() for p in group if p["rings"]]
     x, y = np.log([(p["thickness"], p["late"]) for p in found]).T
-    exponent, factor = np.polyfit(x, y, 1)
-    return float(np.exp(factor)), float(exponent), float(np.std(y - exponent * x - factor))
+    return float(np.exp(np.mean(y - x))), float(np.exp(np.std(y - x))), float(np.polyfit(x, y, 1)[0])
 
 
 def unstructured(points: Points) -> tuple[float, float]:
     """Mean and standard deviation of the delay less that of the :func:`curve`, of unstructured meshes."""
-    factor, exponent, _ = curve(points)
-    off = [p["late"] - factor * p["thickness"] ** exponent for group in delays(points).values() for p in group
-           if not p["rings"]]
+    slope, *_ = curve(points)
+    off = [p["late"] - slope * p["thickness"] for group in delays(points).values() for p in group if not p["rings"]]
     return float(np.mean(off)), float(np.std(off, ddof=1)) if len(off) > 1 else 0.0
 
 
@@ -199,7 +197,7 @@ MARKS = {"unstructured": "o", "rings 1": "s", "rings 2": "D", "rings 4": "^", "r
 def draw(points: Points, path: Path) -> None:
     """Delay of each onset against where the first Gauss point is, and against the number of elements."""
     groups = delays(points)
-    factor, exponent, _ = curve(points)
+    slope, *_ = curve(points)
     with page(path, "How late the onset at a notch is", 1, 2, 3.6) as axes:
         for ax, x in zip(axes, ("thickness", "per_radius")):
             for kind, mark in MARKS.items():
@@ -209,8 +207,8 @@ def draw(points: Points, path: Path) -> None:
                     ax.plot([scale * p[x] for p in mine], [100 * p["late"] for p in mine], mark, ms=3.5, linestyle="",
                             color=COLOURS[name], fillstyle="none" if kind == "unstructured" else "full")
             ax.set(xscale="log", yscale="log", ylabel="delay of the onset (% of the opening)")
-        t = np.geomspace(0.01, 1.5, 50)
-        axes[0].plot(FIRST * t, 100 * factor * t**exponent, "k-", linewidth=0.8, label="power law")
+        t = np.array([0.007, 1.0])
+        axes[0].plot(FIRST * t, 100 * slope * t, "k-", linewidth=0.8, label="in proportion")
         axes[0].set_xlabel("first Gauss point below the surface / radius")
         axes[1].set_xlabel("elements in a radius along the tip")
         for (law, radius), colour in COLOURS.items():
@@ -240,11 +238,11 @@ def table(points: Points) -> list[str]:
                 f"| | {kind.replace('rings ', 'rings, aspect ')}, l/{size:g} | {len(mine)} | "
                 f"{np.mean([p['per_radius'] for p in mine]):.1f} | {np.mean([p['thickness'] for p in mine]):.3f} | "
                 f"{opening.mean():.4f}{scatter[0]} | {100 * late.mean():.1f}{scatter[1]} % |")
-    factor, exponent, about = curve(points)
+    slope, factor, exponent = curve(points)
     mean, beside = unstructured(points)
-    return [*lines, "", f"Rings: delay = {factor:.2f} (thickness / radius)^{exponent:.2f}, within a factor of "
-            f"{math.exp(about):.2f}; unstructured meshes lie {100 * mean:+.1f} ± {100 * beside:.1f} % of the opening "
-            "beside it."]
+    return [*lines, "", f"Rings: the delay is {slope:.2f} times thickness / radius, within a factor of {factor:.2f} "
+            f"(as a power: of the exponent {exponent:.2f}).", "", f"Unstructured meshes lie {100 * mean:+.1f} ± "
+            f"{100 * beside:.1f} % of the opening beside that."]
 
 
 ONSET = Part("onset", plan, draw, table)

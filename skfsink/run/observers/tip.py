@@ -15,23 +15,23 @@ from ...fem.indicators import corner_near
 from ...fem.space import Space
 from .range import SHARP
 
-__all__ = ["LATE", "check_tip", "late", "thickness_for"]
+__all__ = ["LATE", "SLOPE", "check_tip", "late", "thickness_for"]
 
 log = logging.getLogger(__name__)
 
-CURVE = 0.5, 0.9  # delay = CURVE[0] * (thickness of the elements / radius of the tip) ** CURVE[1]
-LATE = 0.03         # of the opening, past which an onset is warned of
-ALONG = 6           # elements in a radius along a tip, with rings around it, which the curve finds enough
+SLOPE = 0.64  # delay of the onset, of the opening, over the thickness of the elements, of the radius of the tip
+LATE = 0.03   # of the opening, past which an onset is warned of
+ALONG = 6     # elements in a radius along a tip, with rings around it, which the curve finds enough
 
 
 def late(share: float) -> float:
     """By how much of the opening an onset is late, for elements of a thickness, as a share of the radius of the tip."""
-    return CURVE[0] * share ** CURVE[1]
+    return SLOPE * share
 
 
 def thickness_for(delay: float) -> float:
     """Thickness of elements, as a share of the radius of the tip, with which an onset is late by `delay`."""
-    return float((delay / CURVE[0]) ** (1 / CURVE[1]))
+    return delay / SLOPE
 
 
 def check_tip(space: Space, element: int) -> dict[str, Any]:
