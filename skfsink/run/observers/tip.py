@@ -19,7 +19,7 @@ __all__ = ["LATE", "SLOPE", "check_tip", "late", "thickness_for"]
 
 log = logging.getLogger(__name__)
 
-SLOPE = 0.64  # delay of the onset, of the opening, over the thickness of the elements, of the radius of the tip
+SLOPE = 0.61  # delay of the onset, of the opening, over the thickness of the elements, of the radius of the tip
 LATE = 0.03   # of the opening, past which an onset is warned of
 ALONG = 6     # elements in a radius along a tip, with rings around it, which the curve finds enough
 
