@@ -53,7 +53,8 @@ def test_run_keeps_its_warnings(tmp_path: Path):
     """Fails if summary.json does not list what was warned of, or a resumed run forgets it."""
     sim = event(tmp_path, sink="consistent")
     sim.run(Loaded(NOTCHED.onset))
-    expected = [SHARP, "begins to fail at a sharp corner", "the consistent sink varies by more than 1e3", r"falls to -0.\d+: the consistent sink"]
+    expected = [SHARP, "begins to fail at a sharp corner",
+                "the consistent sink varies by more than 1e3", r"falls to -0.\d+: the consistent sink"]
     for texts in (summarize(sim.scene, sim)["warnings"],
                   Simulation(sim.scene, tmp_path, Display(True), resume=True).notes.texts):
         assert len(texts) == 4
