@@ -77,6 +77,8 @@ def squeezed(share: float) -> Sample:
     (lambda: scene(squeezed(0.09)), r"an element near \(0.47, 0\.\d+\) mm is 0.006 mm narrow, most are 0.067 mm .*"
                                     r"mend the mesh there"),
     (lambda: scene(squeezed(0.09), analysis="quasistatic"), None),
+    (lambda: scene(squeezed(0.09), explicit=ExplicitControls(raised_mass=0.01)), None),
+    (lambda: scene(squeezed(0.09), explicit=ExplicitControls(raised_mass=0.005)), r"they fill 0.006 of the volume"),
 ])
 def test_scene_beyond_the_methods_is_warned_of(of: Callable[[], Scene], message: str | None,
                                                caplog: pytest.LogCaptureFixture):
