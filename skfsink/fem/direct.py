@@ -37,8 +37,8 @@ def one_thread_of_openblas() -> AbstractContextManager[Any]:
 class Factorization:
     """Direct solver for symmetric matrices on one pattern (upper triangle); the analysis is done once.
 
-    Memory: the factors of the matrix last given to `factorize`, which `solve`, `apply` and `conjugate` use and
-    `release` drops; `factorize` itself depends on no earlier call.
+    Memory: the factors of the matrix last given to `factorize`, which `solve`, `solve_sum`, `apply` and `conjugate`
+    use and `release` drops; `factorize` itself depends on no earlier call.
 
     Parameters
     ----------

@@ -24,9 +24,9 @@ __all__ = ["StepLength"]
 class StepLength:
     """The length of the next step of one integration.
 
-    Memory: estimate of the limit and its mode, indicator, cuts, calm steps: `look`, `share`, `accepts` and
-    `is_given_up` go on from the body last looked at and the steps last tried, `rejects` from `fix`; `memory` gives what
-    a checkpoint needs.
+    Memory: estimate of the limit and its mode, indicator, cuts, calm steps: `look`, `share`, `accepts`,
+    `is_given_up` and `give_up` go on from the body last looked at and the steps last tried, `rejects` from `fix`;
+    `memory` gives what a checkpoint needs.
 
     Parameters
     ----------
