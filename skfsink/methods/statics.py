@@ -28,6 +28,9 @@ class Statics(StaticLoading):
 
     SNAP = 400  # Newton steps in a pass: the body may snap to a shape far away
 
+    GROWS = 1e-3  # of the sink coefficient of a point in a pass, below which others do not wait for it
+    FAILED = 1e6  # sink coefficient past which more of it changes nothing: gamma is 0 there
+
     IDLE = 100  # passes that change nothing while points wait, after which a run is given up
 
     settled = False  #: whether the last pass of `propagate` found nothing left to change
@@ -112,21 +115,21 @@ class Statics(StaticLoading):
         """Let the history follow `W` (ne, nq) where failure is nearest; True if points that fail had to wait.
 
         Points past the energy limiter wait while another one is much further past it: once that has failed and forces
-        have found their new ways, most of them are relieved. How far is W/Phi, with the limiter of each material.
+        have found their new ways, most of them are relieved. How far is W/Phi, with the limiter of each material. Only
+        live points count whose sink still grows; the others have failed long ago.
         """
-        ratio, live = W / self.density.phi, self.momentum.gamma > 0
+        ratio = W / self.density.phi
         past_limiter = (ratio > 1) & (state.W_max < W)
-        waiting = past_limiter & (self.controls.front * float(ratio[live].max(initial=0.0)) > ratio)
-        if waiting.any() and not self._fails(state, np.where(past_limiter & ~waiting, W, state.W_max)):
-            most = float(ratio[waiting & live].max(initial=0.0))  # the one they wait for has failed long ago
-            waiting &= self.controls.front * most > ratio
+        furthest = float(ratio[past_limiter & (self.momentum.gamma > 0) & self._fails(state, W)].max(initial=0.0))
+        waiting = past_limiter & (self.controls.front * furthest > ratio)
         state.W_max = np.where(waiting, state.W_max, np.maximum(state.W_max, W))
         return bool(waiting.any())
 
-    def _fails(self, state: State, W_max: np.ndarray) -> bool:
-        """Whether the sink grows anywhere if the history of `state` goes on to `W_max` (ne, nq)."""
-        before, after = map(self.density.coefficients, (state.W_max, W_max))
-        return bool((after > (1 + self.density.unchanged) * before).any())
+    def _fails(self, state: State, W: np.ndarray) -> np.ndarray:
+        """Mask of the points where the sink grows if the history of `state` goes on to `W` (ne, nq)."""
+        before, after = map(self.density.coefficients, (state.W_max, np.maximum(state.W_max, W)))
+        mask: np.ndarray = (after > (1 + self.GROWS) * before) & (before < self.FAILED)
+        return mask
 
     def _advance(self, state: State, share: float) -> bool:
         """Let grips and dead loads go on by a `share` of their way at fixed gamma, to the new equilibrium.
