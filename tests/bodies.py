@@ -170,6 +170,12 @@ def momentum_of(space: Space, material: Material, gamma: np.ndarray, element: st
     return momentum
 
 
+def same_bits(one: State, other: State) -> None:
+    """Fails if two states differ by a bit in a field."""
+    for name in ("u", "v", "a", "gamma", "W_max", "deleted"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
+
+
 def close(got, expected, tolerance: float = 1e-12) -> None:
     """Assert that arrays of one shape differ by at most `tolerance` of their greatest entry."""
     assert got.shape == expected.shape

@@ -159,6 +159,10 @@ class Space:
         """L2 projection (ne,) of Gauss point values (ne, nq) on the element constants (Eq. 13)."""
         return np.einsum("eq,eq->e", self.w, values) / self.V
 
+    def mean_slopes(self) -> np.ndarray:
+        """Means over the elements of the gradients of the shape functions [1/mm], (ne, na, dim)."""
+        return np.einsum("eq,eqai->eai", self.w, self.dN) / self.V[:, None, None]
+
     def lump(self, values: np.ndarray) -> np.ndarray:
         """Row sums of the mass matrix with weight `values` (ne, nq):  sum_q w_q values_q N_a(q), (n,)."""
         out = np.zeros(self.n_nodes)

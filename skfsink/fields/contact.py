@@ -25,8 +25,8 @@ class Contact:
     """The medium between the lips of a crack.
 
     Memory: the medium, its tangents, the nodes that follow and their interpolation are of the last `update`, and
-    `follow`, `place`, `stiffest` and `tangent` with them; `energy` is of the last `add_force`, `evaluate`, `renew` or
-    `restore`, and `book` goes on from it; `rest` is of all `renew` so far, and belongs into a checkpoint.
+    `follow`, `place`, `stiffest` and `tangent` with them; `energy` is of the last `add_force`, `evaluate` or `renew`,
+    and `book` goes on from it; `rest` is of all `renew` so far, and belongs into a checkpoint.
 
     Parameters
     ----------
@@ -173,11 +173,6 @@ class Contact:
         """Let it :meth:`renew` at the displacement `u` after the density has fallen, and book what it loses."""
         before, ledger.contact = self.energy, self.renew(u)
         ledger.deletion += before - ledger.contact
-
-    def restore(self, rest: np.ndarray, placed: np.ndarray) -> float:
-        """Energy at the displacement `placed` with the `rest` of a checkpoint."""
-        self.rest[...] = rest
-        return self.evaluate(placed)
 
     def _pressed(self, placed: np.ndarray) -> np.ndarray:
         """d, J_bar and energy of the elements of the medium, (3, medium)."""

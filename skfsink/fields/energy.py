@@ -16,27 +16,13 @@ Every entry is computed from its own definition; none is what is left over from 
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, fields
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from .momentum import Momentum
+__all__ = ["OPTIONAL_TERMS", "Ledger"]
 
-__all__ = ["OPTIONAL_TERMS", "Ledger", "terms_without"]
-
-#: Terms that only some runs have; see :func:`terms_without`.
+#: Terms that only some runs have; see :func:`.terms_without`.
 OPTIONAL_TERMS = ("contact", "viscous")
-
-
-def terms_without(momentum: Momentum, dynamic: bool) -> tuple[str, ...]:
-    """The optional terms that neither options nor materials of a run ask for; none of its files has them.
-
-    This alone says whether a term is written, whatever its value: `contact` in runs with contact, `viscous` in
-    `dynamic` ones with a viscosity. What is made from the files of a run takes it from the header of `history.csv`.
-    """
-    asked = {"contact": momentum.contact is not None, "viscous": dynamic and momentum.is_viscous}
-    return tuple(name for name in OPTIONAL_TERMS if not asked[name])
 
 
 @dataclass

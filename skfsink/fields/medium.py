@@ -49,8 +49,7 @@ class Strips(NamedTuple):
     @classmethod
     def of(cls, space: Space) -> Strips:
         """Those of a mesh."""
-        slopes = np.einsum("eq,eqai->eai", space.w, space.dN) / space.V[:, None, None]
-        return cls(space.conn, space.dN, space.w, slopes)
+        return cls(space.conn, space.dN, space.w, space.mean_slopes())
 
 
 class Law(NamedTuple):

@@ -16,8 +16,9 @@ from ..loads.nodal import NodalLoads
 from ..material import GeneralMaterial, Material
 from ..material.regions import Region, by_element, rest_of
 from .contact import Contact
+from .energy import OPTIONAL_TERMS, Ledger
 
-__all__ = ["BulkViscosity", "Momentum", "Part"]
+__all__ = ["BulkViscosity", "Momentum", "Part", "terms_without"]
 
 
 class Momentum:
@@ -25,7 +26,8 @@ class Momentum:
 
     Memory: the density last given to `set_gamma` and the load time last given to `set_time`: `force`, `tangent`,
     `stiffest`, `viscous_force`, `viscous_tangent`, `lumped_mass` and `consistent_mass` are for these. `potential`, `W`,
-    `energy` and `pressed` are of the last `force`, `compression` of the last `viscous_force`. `contact` is set once.
+    `energy` and `pressed` are of the last `force`, `compression` of the last `viscous_force`. `contact` is set once;
+    `book_contact`, `lips` and `memory` are of what it has seen, and `restore` takes up the last.
 
     Parameters
     ----------
@@ -145,6 +147,24 @@ class Momentum:
         """Energy of the medium between the lips of cracks, of its last evaluation [N mm; N mm/mm in 2D]."""
         return 0.0 if self.contact is None else self.contact.energy
 
+    def book_contact(self, ledger: Ledger, u: np.ndarray) -> None:
+        """Book the energy that the medium between lips loses at the displacement `u` (n, dim) as density falls."""
+        if self.contact is not None:
+            self.contact.book(ledger, u)
+
+    def lips(self, u: np.ndarray) -> np.ndarray | None:
+        """:meth:`.Contact.tangent` at the displacement `u` (n, dim), None where no lips press on each other."""
+        return None if self.contact is None else self.contact.tangent(u)
+
+    def memory(self) -> dict[str, np.ndarray]:
+        """What contact remembers beyond density and load time, for a checkpoint."""
+        return {} if self.contact is None else {"contact_rest": self.contact.rest}
+
+    def restore(self, memory: dict[str, np.ndarray]) -> None:
+        """Take up what :meth:`memory` gave; evaluations after it are with it."""
+        if self.contact is not None:
+            self.contact.rest[...] = memory["contact_rest"]
+
     def force(self, u: np.ndarray, out: np.ndarray | None = None) -> np.ndarray:
         """Internal force at the displacement `u` less the dead loads, (n, dim) [N; N/mm in 2D].
 
@@ -216,3 +236,13 @@ class Momentum:
         if isinstance(self.rho0, np.ndarray):
             return self.backend.lump(gamma * self.rho0)
         return self.backend.lump(gamma) * self.rho0
+
+
+def terms_without(momentum: Momentum, dynamic: bool) -> tuple[str, ...]:
+    """The optional terms that neither options nor materials of a run ask for; none of its files has them.
+
+    This alone says whether a term is written, whatever its value: `contact` in runs with contact, `viscous` in
+    `dynamic` ones with a viscosity. What is made from the files of a run takes it from the header of `history.csv`.
+    """
+    asked = {"contact": momentum.contact is not None, "viscous": dynamic and momentum.is_viscous}
+    return tuple(name for name in OPTIONAL_TERMS if not asked[name])

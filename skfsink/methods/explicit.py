@@ -291,14 +291,14 @@ class Explicit:
     # --- checkpoints ---
     def memory(self) -> dict[str, np.ndarray]:
         """What the integrator remembers beyond the state, for a checkpoint."""
-        contact = self.momentum.contact
         return {"reaction": self.reaction, "zone_depths": np.array([zone.depth for zone in self._zones], int),
                 **{name: np.array(getattr(self, name)) for name in self._REMEMBERED}, **self.length.memory(),
                 **({} if self._viscous is None else {"viscous": self._viscous}),
-                **({} if contact is None else {"contact_rest": contact.rest})}
+                **self.momentum.memory()}
 
     def restore(self, state: State, memory: dict[str, np.ndarray]) -> None:
         """Go on exactly where :meth:`memory` was taken."""
+        self.momentum.restore(memory)
         self.start(state)
         self.reaction = memory["reaction"]
         if self._viscous is not None:
@@ -306,7 +306,5 @@ class Explicit:
         for name in self._REMEMBERED:
             setattr(self, name, memory[name].item())
         self.length.restore(memory)
-        if (contact := self.momentum.contact) is not None:
-            self._pressed = contact.restore(memory["contact_rest"], contact.place(state.u))
         if self.density.zone is not None:
             self._zones = tuple(self.density.zone.of_depth(depth) for depth in memory["zone_depths"])

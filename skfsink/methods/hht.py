@@ -172,15 +172,10 @@ class HHT:
         ledger.drop(self.space.w, old.W, old.gamma, momentum.gamma)
         places, mass = self.inertia.places(), self.inertia.matrix()
         ledger.sink_kinetic += float(np.vdot(old.places - places, self.inertia.half_v2(state.v)))
-        self._book_contact(state)
+        momentum.book_contact(ledger, state.u)
         force, viscous = self._forces(state)
         self._now = Balance(force, self.inertia.times(mass, state.a.ravel()[self.free]), momentum.gamma, old.W, mass,
                             places, viscous)
-
-    def _book_contact(self, state: State) -> None:
-        """Book the energy that the medium between lips loses at fixed displacement as density falls."""
-        if self.momentum.contact is not None:
-            self.momentum.contact.book(state.ledger, state.u)
 
     @property
     def _dead_loads(self) -> np.ndarray | None:
@@ -257,7 +252,7 @@ class HHT:
         state.a[dead] = 0.0
         ledger.kinetic = self.inertia.kinetic(mass, state.v)
         ledger.deletion += moving - ledger.kinetic  # with what the mass floor of dead nodes still had
-        self._book_contact(state)
+        momentum.book_contact(ledger, state.u)
         force, viscous = self._forces(state)
         ledger.elastic, ledger.loads = momentum.energy, momentum.loads
         self._now = Balance(force, new.inertia, momentum.gamma, momentum.W, mass, places, viscous)
@@ -272,15 +267,12 @@ class HHT:
 
     def memory(self) -> dict[str, np.ndarray]:
         """What the integrator remembers beyond the state, for a checkpoint."""
-        contact = self.momentum.contact
-        return {"inertia": self._now.inertia, "rate": self._rate,
-                **({} if contact is None else {"contact_rest": contact.rest}),
+        return {"inertia": self._now.inertia, "rate": self._rate, **self.momentum.memory(),
                 **{name: np.array(getattr(self, name)) for name in ("dt", "rejected", "iterations")}}
 
     def restore(self, state: State, memory: dict[str, np.ndarray]) -> None:
         """Go on exactly where :meth:`memory` was taken."""
-        if self.momentum.contact is not None:
-            self.momentum.contact.rest[...] = memory["contact_rest"]
+        self.momentum.restore(memory)
         self.start(state)
         self._now = self._now._replace(inertia=memory["inertia"])
         self._rate = memory["rate"]

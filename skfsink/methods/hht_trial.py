@@ -185,8 +185,7 @@ class Trial:
 
     def _solve(self, b: np.ndarray) -> np.ndarray:
         """Solution for the right-hand side `b` with the factors, and with lips that press on each other."""
-        solver, contact = self.scheme.solver, self.momentum.contact
-        B = None if contact is None else contact.tangent(self.u)
+        solver, B = self.scheme.solver, self.momentum.lips(self.u)
         if B is None:
             return solver.solve(b, tolerance=1e-8)
         return solver.solve_sum(np.sqrt(1 + self.scheme.controls.alpha) * B, b)

@@ -95,7 +95,7 @@ class Newton:
             step, fresh = np.zeros(u.shape), False
             while True:
                 if modified:
-                    d = self._solve(r, self._lips(u))
+                    d = self._solve(r, momentum.lips(u))
                 else:
                     d, fresh = self._direction(u, r)
                 step.reshape(-1)[self.free] = d
@@ -135,7 +135,7 @@ class Newton:
     def _direction(self, u: np.ndarray, r: np.ndarray, tolerance: float = INEXACT) -> tuple[np.ndarray, bool]:
         """A step that lowers the residual force `r` at `u`, and whether the factors behind it are those of `u`."""
         data = self.momentum.tangent(self.pattern, u)
-        lips = self._lips(u)
+        lips = self.momentum.lips(u)
         if self._kept is not None and lips is None and self._spent < self.WORTH[self.space.dim - 2]:
             most = self.MOST[self.space.dim - 2]
             d, iterations, met = self.solver.conjugate(data, -r, tolerance, most)
@@ -147,10 +147,6 @@ class Newton:
                 return d, False
         self._factorise(u, data)
         return self._solve(r, lips), True
-
-    def _lips(self, u: np.ndarray) -> np.ndarray | None:
-        """B, over the free unknowns, of the tangent B B^T of lips that press on each other at `u`; None if none do."""
-        return None if self.momentum.contact is None else self.momentum.contact.tangent(u)
 
     def _solve(self, r: np.ndarray, B: np.ndarray | None) -> np.ndarray:
         """Solution of (K + B B^T) d = -r with the factors of K; without B of K d = -r."""

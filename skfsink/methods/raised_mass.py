@@ -27,10 +27,12 @@ def raised_mass(momentum: Momentum, share: float) -> tuple[np.ndarray | None, fl
     momentum: the balance of momentum of the body.
     share: of the volume, that the elements with more mass may fill, in [0, 1).
     """
+    if share == 0.0:
+        return None, 0.0
     space, square = momentum.space, np.empty(momentum.space.n_elements)
     for material, elements, _ in momentum.parts:
         square[slice(None) if elements is None else elements] = material.dilatational_wave_speed**2
-    b = np.einsum("eq,eqai->eai", space.w, space.dN) / space.V[:, None, None]
+    b = space.mean_slopes()
     square *= b.shape[1] * np.einsum("eai,eai->e", b, b)
     fastest = np.argsort(-square, kind="stable")
     count = np.count_nonzero(np.cumsum(space.V[fastest]) <= share * space.V.sum())

@@ -91,8 +91,7 @@ class Statics(StaticLoading):
             ledger.drop(self.space.w, W, old, undeleted)
             ledger.deletion += float(np.einsum("eq,eq,eq->", self.space.w, W, undeleted - self.momentum.gamma))
             ledger.elastic = float(np.einsum("eq,eq,eq->", self.space.w, W, self.momentum.gamma))
-            if self.momentum.contact is not None:
-                self.momentum.contact.book(ledger, state.u)
+            self.momentum.book_contact(ledger, state.u)
             self.settled = change <= self.controls.gamma_tolerance and not postponed
             idle = idle + 1 if postponed and change <= self.controls.gamma_tolerance else 0
             if idle > self.IDLE:
@@ -158,13 +157,11 @@ class Statics(StaticLoading):
     # --- checkpoints ---
     def memory(self) -> dict[str, np.ndarray]:
         """What the analysis remembers beyond the state."""
-        contact = self.momentum.contact
         return {"settled": np.array(self.settled), "arrested": np.array(self.arrested), **super().memory(),
-                **({} if contact is None else {"contact_rest": contact.rest})}
+                **self.momentum.memory()}
 
     def restore(self, memory: dict[str, np.ndarray]) -> None:
         """Take up what :meth:`memory` gave."""
         self.settled, self.arrested = bool(memory["settled"]), str(memory["arrested"])
-        if self.momentum.contact is not None:
-            self.momentum.contact.rest[...] = memory["contact_rest"]
+        self.momentum.restore(memory)
         super().restore(memory)

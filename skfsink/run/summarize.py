@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from ..fields.energy import OPTIONAL_TERMS, terms_without
+from ..fields.energy import OPTIONAL_TERMS
 from ..fields.fragments import fragments
+from ..fields.momentum import terms_without
 from ..results.frame import SPENT
 from ..results.history import history_units, load_name
 from ..results.summary import versions

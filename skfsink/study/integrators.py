@@ -22,7 +22,7 @@ from .chart import draw_front, listed, page
 from .meshes import load_plate
 from .pareto import pareto_front
 from .part import Part, Planned, Points
-from .plate import Integrator, Plate, warm
+from .plate import NO_REJECTION, Integrator, Plate, warm
 
 __all__ = ["ERRORS", "TIME", "Method", "errors"]
 
@@ -53,7 +53,7 @@ class Method:
 
 
 def _explicit(courant: float = ExplicitControls.courant, gamma_every: int = 0) -> ExplicitControls:
-    return ExplicitControls(courant, gamma_every, energy_tolerance=0.0)
+    return replace(NO_REJECTION[0], courant=courant, gamma_every=gamma_every)
 
 
 def methods(quick: bool) -> list[Method]:
@@ -63,12 +63,12 @@ def methods(quick: bool) -> list[Method]:
         for every in (1, 5, 20) if quick else (1, 2, 5, 10, 20):
             found.append(Method(f"explicit, Courant {courant:g}, γ every {every}", "explicit", f"γ every {every}",
                                 _explicit(courant, every)))
-    found.append(Method("HHT, default but no rejection", "HHT", "default", HHTControls(gain_tolerance=1.0)))
+    found.append(Method("HHT, default but no rejection", "HHT", "default", NO_REJECTION[1]))
     for coupling in ("iterated", "single"):
         for alpha in (-0.05,) if quick else (0.0, -0.05, -0.3):
             for dt in (1.0, 0.25) if quick else (2.0, 1.0, 0.5, 0.25, 0.12, 0.06, 0.03):
                 found.append(Method(f"HHT, {coupling}, α {alpha:g}, Δt {dt:g} µs", "HHT", f"{coupling}, α {alpha:g}",
-                                    HHTControls(alpha, dt * 1e-6, coupling=coupling, gain_tolerance=1.0)))
+                                    replace(NO_REJECTION[1], alpha=alpha, dt=dt * 1e-6, coupling=coupling)))
     return found
 
 

@@ -19,12 +19,12 @@ from ..methods.controls import ExplicitControls, HHTControls
 from .chart import page
 from .meshes import load_plate
 from .part import Part, Planned, Points
-from .plate import PULLED, SLAB, SPEED, Integrator, Plate, warm
+from .plate import NO_REJECTION, PULLED, SLAB, SPEED, Integrator, Plate, warm
 
 __all__ = ["MODEL", "Variant", "changes"]
 
 SEEDS = ("0", "1", "2")
-EXPLICIT, IMPLICIT = ExplicitControls(energy_tolerance=0.0), HHTControls(gain_tolerance=1.0)
+EXPLICIT, IMPLICIT = NO_REJECTION
 HALF = (Grip("bottom", (0.0, -SPEED)), Grip("seam", (None, 0.0)))
 SHEET = (Grip("top", (0.0, SPEED, 0.0)), Grip("back", (None, None, 0.0)), Grip("bottom", (0.0, -SPEED, 0.0)))
 

@@ -25,7 +25,6 @@ import meshio
 import numpy as np
 from cyclopts import Parameter
 
-from ..material import SinkLaw, limiter_of, material_from
 from ..meshing.outline import Edge, SizeField, mesh_outline
 from ..meshing.sample import Sample, mesh_sample
 from ..run.display import Display
@@ -72,7 +71,7 @@ class Tip:
     def __call__(self) -> dict[str, Any]:
         """The opening at the onset [mm], and what :func:`measured` says of the elements at the tip."""
         sample = mesh_sample(self.key, plate_mesh(self))
-        plate = Plate(sample, material=material_from(self.law), law=SinkLaw(phi=limiter_of(self.law).phi))
+        plate = Plate.of_law(sample, self.law)
         state = plate.onset
         weakest = int(np.argmax(state.W_max.max(axis=1)))
         return {"opening_mm": plate.onset_figures["opening_mm"], "elements": sample.space.n_elements,

@@ -16,7 +16,7 @@ from ..fields.density import Density, DensitySolver
 from ..fields.momentum import Momentum
 from ..fields.state import State
 from ..loads.grips import Grip
-from ..material import AAA, Material, SinkLaw
+from ..material import AAA, Material, SinkLaw, limiter_of, material_from
 from ..meshing.sample import Sample
 from ..methods.controls import ExplicitControls, HHTControls, StaticsControls
 from ..methods.explicit import Explicit
@@ -25,11 +25,13 @@ from ..methods.statics import Statics
 from ..scene.scene import Scene
 from .meshes import load_plate
 
-__all__ = ["PULLED", "SLAB", "SPEED", "Front", "Integrator", "Make", "Plate", "first_passages", "warm"]
+__all__ = ["NO_REJECTION", "PULLED", "SLAB", "SPEED", "Front", "Integrator", "Make", "Plate", "first_passages", "warm"]
 
 Integrator = Explicit | HHT
 Make = Callable[["Plate"], Integrator]
 
+#: options of the two integrators with which no step is rejected for its energy
+NO_REJECTION = ExplicitControls(energy_tolerance=0.0), HHTControls(gain_tolerance=1.0)
 SPEED = 1e-3  # of a grip [mm/s]; it only sets the clock of the loading
 #: both ends of a plate move apart and are held sideways
 PULLED = (Grip("top", (0.0, SPEED)), Grip("bottom", (0.0, -SPEED)))
@@ -71,6 +73,11 @@ class Plate:
     overshoot: float = 0.005
     exact: bool = False
     onset_tolerance: float = 5e-4
+
+    @classmethod
+    def of_law(cls, sample: Sample, law: str, **settings: Any) -> Plate:
+        """The plate of a law of the library, by name, with its own limiter; `settings` are other parameters."""
+        return cls(sample, material=material_from(law), law=SinkLaw(phi=limiter_of(law).phi), **settings)
 
     @cached_property
     def scene(self) -> Scene:

@@ -28,7 +28,7 @@ from cyclopts import Parameter
 
 from ..errors import SkfsinkError
 from ..fem import indicators
-from ..material import MATERIALS, GeneralMaterial, SinkLaw, limiter_of, material_from
+from ..material import MATERIALS, GeneralMaterial
 from ..methods.controls import ExplicitControls, HHTControls
 from ..run.display import Display
 from ..scene.options import Options
@@ -60,7 +60,7 @@ def plate(law: str, element: str, size: str, seed: int) -> Plate:
     else:
         case = find_case("single_edge_notch")
         sample = case.scene({**case.default_arguments, "mesh": size, "mesh_seed": seed}, Options()).sample
-    return Plate(sample, material=material_from(law), law=SinkLaw(phi=limiter_of(law).phi), element=element)
+    return Plate.of_law(sample, law, element=element)
 
 
 def event(law: str, element: str, size: str, seed: int, scheme: str, *, courant: float | None = None) -> dict[str, Any]:

@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from ..material import SinkLaw, limiter_of, material_from
 from ..methods.controls import ExplicitControls
 from .chart import page
 from .meshes import load_plate
@@ -38,7 +37,7 @@ MEASURES = {"arrival_us": "arrival time", "D": "$D$ at the arrival", "U": "$U$ a
 
 @cache
 def _plate(law: str, seed: str) -> Plate:
-    return Plate(load_plate(f"plate{seed}"), material=material_from(law), law=SinkLaw(phi=limiter_of(law).phi))
+    return Plate.of_law(load_plate(f"plate{seed}"), law)
 
 
 @dataclass(frozen=True)

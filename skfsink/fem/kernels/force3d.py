@@ -90,6 +90,16 @@ def _push(g, k, F):  # type: ignore[no-untyped-def]
 
 
 @njit(fastmath=FAST)
+def _deformation(conn, x, geo, z, g, F):  # type: ignore[no-untyped-def]
+    """F, or its rate, (9, Q), from positions or velocities x (n, 3) of the nodes conn; z (24 L), g (3 Q): scratch."""
+    L, Q = LANES, 8 * LANES
+    _gather(conn, x, z)
+    for c in range(3):
+        _gradient(z[8 * c * L:8 * (c + 1) * L], g)
+        _push(g, geo, F[3 * c * Q:3 * (c + 1) * Q])
+
+
+@njit(fastmath=FAST)
 def _invariants(F, J, floored, tr):  # type: ignore[no-untyped-def]
     Q = 8 * LANES
     for i in range(Q):
@@ -205,10 +215,7 @@ def force_3d(address, constants, volumetric_part, x, elements):  # type: ignore[
     for tile in range(conn.shape[0]):
         geo, gam = geometry[tile].reshape(-1), gamma[tile].reshape(-1)
         w = geo[WEIGHT * Q:]
-        _gather(conn[tile], x, z)
-        for c in range(3):
-            _gradient(z[8 * c * L:8 * (c + 1) * L], g)
-            _push(g, geo, F[3 * c * Q:3 * (c + 1) * Q])
+        _deformation(conn[tile], x, geo, z, g, F)
         _invariants(F, J, floored, tr)
         least_live(J, gam, least)
         guess_inverse_cbrt(floored.view(np.int64), R.view(np.int64))

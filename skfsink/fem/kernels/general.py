@@ -214,10 +214,7 @@ def force_general_3d(address, constants, volumetric_part, x, elements):  # type:
     for tile in range(conn.shape[0]):
         geo, gam = geometry[tile].reshape(-1), gamma[tile].reshape(-1)
         w = geo[force3d.WEIGHT * Q:]
-        force3d._gather(conn[tile], x, z)
-        for i in range(3):
-            force3d._gradient(z[8 * i * L:8 * (i + 1) * L], g)
-            force3d._push(g, geo, F[3 * i * Q:3 * (i + 1) * Q])
+        force3d._deformation(conn[tile], x, geo, z, g, F)
         force3d._invariants(F, J, floored, tr)
         force2d.least_live(J, gam, least)
         guess_inverse_cbrt(floored.view(np.int64), R.view(np.int64))

@@ -188,14 +188,8 @@ def viscous_3d(viscous, x, v, elements):  # type: ignore[no-untyped-def]
     for tile in range(conn.shape[0]):
         geo, g = geometry[tile].reshape(-1), gamma[tile].reshape(-1)
         w = geo[force3d.WEIGHT * Q:]
-        force3d._gather(conn[tile], x, z)
-        for i in range(3):
-            force3d._gradient(z[8 * i * L:8 * (i + 1) * L], t)
-            force3d._push(t, geo, F[3 * i * Q:3 * (i + 1) * Q])
-        force3d._gather(conn[tile], v, z)
-        for i in range(3):
-            force3d._gradient(z[8 * i * L:8 * (i + 1) * L], t)
-            force3d._push(t, geo, G[3 * i * Q:3 * (i + 1) * Q])
+        force3d._deformation(conn[tile], x, geo, z, t, F)
+        force3d._deformation(conn[tile], v, geo, z, t, G)
         force3d._invariants(F, J, floored, tr)
         _inverse(J, False, inverse)
         _cofactors(F, C)

@@ -67,10 +67,7 @@ def volumetric_3d(x, elements, inverse_mass):  # type: ignore[no-untyped-def]
     for tile in range(conn.shape[0]):
         geo, w = geometry[tile].reshape(-1), geometry[tile].reshape(-1)[force3d.WEIGHT * Q:]
         ab[Q:] = w
-        force3d._gather(conn[tile], x, z)
-        for c in range(3):
-            force3d._gradient(z[8 * c * L:8 * (c + 1) * L], t)
-            force3d._push(t, geo, F[3 * c * Q:3 * (c + 1) * Q])
+        force3d._deformation(conn[tile], x, geo, z, t, F)
         force3d._piola(F, ab, P)
         for c in range(3):
             force3d._pull(P[3 * c * Q:3 * (c + 1) * Q], geo, t)

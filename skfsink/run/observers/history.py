@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from ...errors import CheckpointError, ParameterError
-from ...fields.energy import terms_without
+from ...fields.momentum import terms_without
 from ...results.history import HISTORY_COLUMNS, deletions_header
 from ...results.history import History as Rows
 from ...system.files import write_atomic
