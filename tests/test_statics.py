@@ -231,7 +231,7 @@ def test_points_wait_while_one_is_much_further_past_the_limit(fracture: Fracture
     statics = Statics(held_body(momentum, density, fracture.free, fracture.velocity))
     phi, before = density.law.phi, state.W_max.copy()
     W = 0.5 * before
-    W[0], W[1], W[2], W[3] = 3.0 * phi, 2.5 * phi, 1.5 * phi, 0.9 * phi
+    W[0], W[1], W[2], W[3] = 3.0 * phi, 2.9 * phi, 1.5 * phi, 0.9 * phi
     assert statics._follow(state, W)
     followed = [0, 1, 3]
     assert np.array_equal(state.W_max[followed], np.maximum(before, W)[followed])

@@ -18,20 +18,21 @@ from ..units import Unit
 __all__ = ["simple_shear"]
 
 ASSUMED = (
-    "side 4 mm: the paper prints no length of the plate; its 50,847 elements are then of size l/5.7 throughout",
-    "notch 2 mm long, to the middle, at mid-height: not printed",
+    "side 5 mm: the paper prints no length of the plate; its 50,847 elements are then of size l/4.5 throughout",
+    "notch 2.5 mm long, to the middle, at mid-height: not printed",
     "notch 0.1 mm = l wide with a round tip: not printed",
-    "the top edge stays at its height: the paper prescribes its motion in x and does not mention y",
+    "the top edge is free to move up and down: the paper prescribes its motion in x, and says of the bottom edge that "
+    "both directions are fixed",
     "the mesh of the upper half is the mirror image of the lower one",
 )
 
 
 def simple_shear(
         *,
-        side: Annotated[float, SAMPLE, Unit("mm")] = 4.0,
-        notch: Annotated[float, SAMPLE, Unit("mm")] = 2.0,
+        side: Annotated[float, SAMPLE, Unit("mm")] = 5.0,
+        notch: Annotated[float, SAMPLE, Unit("mm")] = 2.5,
         notch_width: Annotated[float, SAMPLE, Unit("mm")] = 0.1,
-        top: Annotated[str, SAMPLE] = "held",
+        top: Annotated[str, SAMPLE] = "free",
         mesh: Annotated[str, SAMPLE] = "M4",
         mesh_seed: Annotated[int, SAMPLE] = 0,
         options: Options = Options(),  # noqa: B008
@@ -50,9 +51,9 @@ def simple_shear(
     notch_width
         Width of the notch [mm], in (0, side).
     top
-        "held" or "free": whether the top edge keeps its height, or may move up and down.
+        "free" or "held": whether the top edge may move up and down, or keeps its height (two cracks then run).
     mesh
-        "coarse" (element size l/4 where the crack runs), "M4" (l/4, wider), "paper" (l/5.7 throughout), or the path
+        "coarse" (element size l/4 where the crack runs), "M4" (l/4, wider), "paper" (l/4.5 throughout), or the path
         of a mesh file.
     mesh_seed
         Another mesh of the same sizes for each number; other than 0 it needs gmsh (the mesh extra).

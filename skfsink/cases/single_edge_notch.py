@@ -19,9 +19,9 @@ __all__ = ["single_edge_notch"]
 
 ASSUMED = (
     "side 4 mm: the paper prints no length of the plate; N h^2 of Table 1 fits 10 to 11 mm^2 of fine mesh",
-    "notch 1 mm long at mid-height: not printed",
+    "notch 1 mm long at mid-height: not printed; U is then near that of Table 1, with branches",
     "notch 0.1 mm = l wide with a round tip: not printed",
-    "fine elements within 1.7 mm of mid-height, 0.11 mm elsewhere: chosen to meet the element counts of Table 1",
+    "fine elements within 1.68 mm of mid-height, 0.11 mm elsewhere: chosen to meet the element counts of Table 1",
 )
 
 

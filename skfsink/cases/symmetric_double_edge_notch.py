@@ -18,8 +18,8 @@ from ..units import Unit
 __all__ = ["symmetric_double_edge_notch"]
 
 ASSUMED = (
-    "side 3 mm: the paper prints no length; with notches of 0.5 mm, U is then near its 0.0295 N mm/mm",
-    "notches 0.5 mm long at mid-height: not printed",
+    "side 3 mm: the paper prints no length; with notches of 0.45 mm, U is then near its 0.0295 N mm/mm",
+    "notches 0.45 mm long at mid-height: not printed",
     "notches 0.1 mm = l wide with round tips: not printed",
     "the grips hold the plate sideways: not printed",
     "element size l/5 on the mesh `paper`: not printed",
@@ -30,7 +30,7 @@ ASSUMED = (
 def symmetric_double_edge_notch(
         *,
         side: Annotated[float, SAMPLE, Unit("mm")] = 3.0,
-        notch: Annotated[float, SAMPLE, Unit("mm")] = 0.5,
+        notch: Annotated[float, SAMPLE, Unit("mm")] = 0.45,
         notch_width: Annotated[float, SAMPLE, Unit("mm")] = 0.1,
         mesh: Annotated[str, SAMPLE] = "M4",
         mesh_seed: Annotated[int, SAMPLE] = 0,

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-__all__ = ["ASPECT", "Edge", "Point", "circle"]
+__all__ = ["ALONG", "ASPECT", "Edge", "Point", "circle"]
 
 Point = tuple[float, float]
 
-ASPECT = 4.0  # of the elements along an arc: length over thickness
+ALONG = 6     # elements in a radius along the tip of a notch, which docs/notches.md finds enough
+ASPECT = 8.0  # of the elements along an arc: length over thickness
 
 
 class Edge(NamedTuple):

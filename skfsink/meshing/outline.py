@@ -38,6 +38,7 @@ TYPICAL_SCALE = 1.155  # triangles of 1.155 h make quadrilaterals of size h
 TOLERANCE = 0.01  # relative, for the number of elements
 LOOSE = 0.05  # the same along a corridor, which has no number to meet
 SMALLEST = 0.25  # least area over longest diagonal, in element sizes (a square has 0.71)
+SMALLEST_AT_RINGS = 0.125  # the same where rings make elements smaller: those that end them are as flat as they are
 LEAST_JACOBIAN = 0.5
 ATTEMPTS = 12  # meshes that are made to meet the last three
 
@@ -105,7 +106,7 @@ def mesh_outline(outline: Sequence[Edge], size: SizeField, *, seed: int = 0,
         for attempt in range(ATTEMPTS):
             ripple = _ripple(RIPPLE_LENGTH * size.h, seed, attempt, image=image)
             points, quads, blocks, triangles = generate(gmsh, sizes, ripple, scale, names)
-            ratio, miss = _judge(points, quads, sizes, TOLERANCE if size.distance is None else LOOSE)
+            ratio, miss = _judge(points, quads, sizes, size, TOLERANCE if size.distance is None else LOOSE)
             if miss < least and not triangles:
                 best, least = (points, quads, blocks), miss
             if least <= 1:
@@ -188,16 +189,21 @@ def _ripple(length: float, *seeds: int, waves: int = 8,
     return lambda x, y: (factor(x, y) + factor(*image(np.array([[x, y]]))[0])) / 2
 
 
-def _judge(points: Array, quads: Indices, size: Sizes, allowed: float) -> tuple[float, float]:
-    """Number of elements over that of squares of the asked sizes; badness (1: good enough), with what it may be off."""
+def _judge(points: Array, quads: Indices, size: Sizes, without: Sizes, allowed: float) -> tuple[float, float]:
+    """Number of elements over that of squares of the asked sizes; badness (1: good enough), with what it may be off.
+
+    `without` are the sizes as they would be without rings.
+    """
     cells = points[quads]
-    wanted = np.array([size(x, y) for x, y, _ in cells.mean(axis=1).tolist()])
+    centres = cells.mean(axis=1)[:, :2].tolist()
+    wanted, alone = (np.array([sizes(x, y) for x, y in centres]) for sizes in (size, without))
     area, diagonals = areas(cells), np.linalg.norm(cells[:, 2:] - cells[:, :2], axis=2)
     ratio = len(quads) / float(np.sum(area / wanted**2))
-    smallest, jacobian = np.min(area / diagonals.max(axis=1) / wanted), scaled_jacobian(points, quads).min()
+    least = np.where(wanted < alone, SMALLEST_AT_RINGS, SMALLEST) * wanted
+    smallest, jacobian = np.min(area / diagonals.max(axis=1) / least), scaled_jacobian(points, quads).min()
     if smallest <= 0 or jacobian <= 0:
         return ratio, math.inf
-    return ratio, max(abs(ratio - 1) / allowed, SMALLEST / smallest, LEAST_JACOBIAN / jacobian)
+    return ratio, max(abs(ratio - 1) / allowed, 1 / smallest, LEAST_JACOBIAN / jacobian)
 
 
 def _to_meshio(points: Array, quads: Indices, blocks: Blocks, names: Sequence[str]) -> meshio.Mesh:

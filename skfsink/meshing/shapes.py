@@ -2,7 +2,8 @@
 
 Each sample has a function that returns its mesh; its keyword arguments are the sample's dimensions [mm], the element
 sizes and the `seed`. `h_tip` is the size of the elements along the round tips of notches, around which elements are
-laid in rings (see :mod:`.ring`); with None, the default, there are none, and elements there are of size `h`.
+laid in rings (see :mod:`.ring`); None is a sixth of its radius, and with 0, the default of the
+asymmetric plate and of the shell, there are no rings.
 Three-dimensional samples are meshed as a section, which :mod:`.sweeping` turns into hexahedra. The meshes in
 `cases/<sample>/meshes` are from `python -m skfsink.meshing.shapes <sample> [--mesh M3]` and gmsh 4.15.2.
 """
@@ -20,6 +21,7 @@ import meshio
 import numpy as np
 
 from ..errors import require
+from .edge import ALONG
 from .outline import Band, Box, Distance, Edge, SizeField, completed, mesh_outline, scaled_jacobian
 from .vtu import write_mesh
 
@@ -32,7 +34,7 @@ Image = Callable[[np.ndarray], np.ndarray]
 
 def single_edge_notch_mesh(*, side: float = 4.0, notch: float = 1.0, notch_width: float = 0.1,
                            h: float = 0.1 / 3, h_coarse: float = 0.11, h_tip: float | None = None,
-                           half_height: float = 1.7, symmetry: str = "none", distance: Distance | None = None,
+                           half_height: float = 1.68, symmetry: str = "none", distance: Distance | None = None,
                            seed: int = 0) -> meshio.Mesh:
     """Mesh the square plate [0, side]^2 with a round-tipped notch from the left edge at mid-height.
 
@@ -51,26 +53,27 @@ def single_edge_notch_mesh(*, side: float = 4.0, notch: float = 1.0, notch_width
     return _edge_notched(side, _Notch(notch, notch_width, h_tip), size=size, symmetry=symmetry, seed=seed)
 
 
-def simple_shear_mesh(*, side: float = 4.0, notch: float = 2.0, notch_width: float = 0.1, h: float = 0.025,
-                      h_coarse: float = 0.11, h_tip: float | None = None, half_width: float = 0.5,
+def simple_shear_mesh(*, side: float = 5.0, notch: float = 2.5, notch_width: float = 0.1, h: float = 0.025,
+                      h_coarse: float = 0.11, h_tip: float | None = None, half_width: float = 0.8,
                       symmetry: str = "mirror", distance: Distance | None = None, seed: int = 0) -> meshio.Mesh:
     """Mesh the square plate [0, side]^2 with a round-tipped notch from the left edge to the middle.
 
-    Sheared to the right at its top, the plate cracks from the tip down to the right. Elements are of size `h` around
-    the tip and in a band of `half_width` on each side of that path, graded to `h_coarse` elsewhere. The upper half is
-    the mirror image of the lower one, so that the stretched and the compressed side of the tip have the same elements,
-    unless `symmetry` is "none". Boundaries as those of the single-edge notched plate.
+    Sheared to the right at its top, the plate cracks from the tip down to the right, to the right edge a quarter up.
+    Elements are of size `h` around the tip and in a band of `half_width` on each side of that line, graded to
+    `h_coarse` elsewhere. The upper half is the mirror image of the lower one, so that the stretched and the compressed
+    side of the tip have the same elements, unless `symmetry` is "none". Boundaries as those of the single-edge notched
+    plate.
     """
     check_plate(side, notch, notch_width)
     require("half_width", half_width, "mm", low=0, low_open=True)
     middle = side / 2
     tip: Box = (notch - 0.25, notch + 0.35, middle - 0.35, middle + 0.35)
-    path: Band = (notch, middle, notch + 0.75 * middle, 0, half_width)
+    path: Band = (notch, middle, side, middle / 2, half_width)
     size = SizeField(h, h_coarse, (tip,), (path,), distance=distance)
     return _edge_notched(side, _Notch(notch, notch_width, h_tip), size=size, symmetry=symmetry, seed=seed)
 
 
-def symmetric_double_edge_notch_mesh(*, side: float = 3.0, notch: float = 0.5, notch_width: float = 0.1,
+def symmetric_double_edge_notch_mesh(*, side: float = 3.0, notch: float = 0.45, notch_width: float = 0.1,
                                      h: float = 0.025, h_coarse: float = 0.11, h_tip: float | None = None,
                                      half_height: float = 0.7, symmetry: str = "turn",
                                      distance: Distance | None = None, seed: int = 0) -> meshio.Mesh:
@@ -96,7 +99,7 @@ def symmetric_double_edge_notch_mesh(*, side: float = 3.0, notch: float = 0.5, n
 
 def asymmetric_double_edge_notch_mesh(*, side: float = 4.0, notch: float = 0.6, notch_width: float = 0.1,
                                       offset: float = 1.0, h: float = 0.025, h_coarse: float = 0.11,
-                                      h_tip: float | None = None, half_height: float = 1.35, symmetry: str = "turn",
+                                      h_tip: float | None = 0.0, half_height: float = 1.35, symmetry: str = "turn",
                                       distance: Distance | None = None, seed: int = 0) -> meshio.Mesh:
     """Mesh the square plate [0, side]^2 with a notch from each side, the right one higher by `offset`.
 
@@ -143,7 +146,7 @@ def dog_bone_mesh(*, length: float = 10.0, gauge_length: float = 4.0, gauge_widt
 
 def cylindrical_shell_mesh(*, inner_radius: float = 1.9, thickness: float = 0.1, length: float = 5.0,
                            notch: float = 1.0, notch_width: float = 0.1, h: float = 0.025, h_coarse: float = 0.11,
-                           h_tip: float | None = None, half_height: float = 1.2, distance: Distance | None = None,
+                           h_tip: float | None = 0.0, half_height: float = 1.2, distance: Distance | None = None,
                            seed: int = 0) -> meshio.Mesh:
     """Mesh the unrolled mid-surface of a half cylinder, [0, pi r] x [0, length], with a slit in its middle.
 
@@ -156,8 +159,9 @@ def cylindrical_shell_mesh(*, inner_radius: float = 1.9, thickness: float = 0.1,
     require("half_height", half_height, "mm", low=0, low_open=True)
     r, crown, tip = notch_width / 2, arc / 2, arc / 2 - notch / 2
     outline = [Edge("bottom", (crown, 0)), Edge("seam", (crown, middle - r)), Edge("notch", (tip + r, middle - r)),
-               Edge("notch", (tip + r, middle + r), via=(tip, middle), h=h_tip), Edge("notch", (crown, middle + r)),
-               Edge("seam", (crown, length)), Edge("top", (0, length)), Edge("edge", (0, 0))]
+               Edge("notch", (tip + r, middle + r), via=(tip, middle), h=_Notch(notch, notch_width, h_tip).h),
+               Edge("notch", (crown, middle + r)), Edge("seam", (crown, length)), Edge("top", (0, length)),
+               Edge("edge", (0, 0))]
     corridor = (0.0, arc, middle - half_height, middle + half_height)
 
     def image(points: np.ndarray) -> np.ndarray:
@@ -194,11 +198,16 @@ def check_shell(inner_radius: float, thickness: float, length: float, notch: flo
 
 
 class _Notch(NamedTuple):
-    """Length up to the tip and width of a notch, and the size of the elements along its tip, None for no rings [mm]."""
+    """Length up to the tip and width of a notch, and the size asked for along its tip [mm]; see `h`."""
 
     length: float
     width: float
-    h: float | None
+    h_tip: float | None
+
+    @property
+    def h(self) -> float | None:
+        """Size of the elements in the innermost ring around the tip [mm], None for no rings."""
+        return self.width / 2 / ALONG if self.h_tip is None else self.h_tip or None
 
     def from_left(self, y: float) -> list[Edge]:
         """From the left edge above the notch, at height `y`, to the left edge below it."""
@@ -275,16 +284,17 @@ class Shape(NamedTuple):
     meshes: Mapping[str, Mapping[str, Any]]
 
 
-# Sizes are l/1.5, l/3, l/4 and l/5 for the length l = 0.1 mm, moved by at most 1 % (and the sizes away from the
-# cracks chosen) so that the numbers of elements are within 3 % of the paper's: 11,140, 18,967 and 28,784 in Table 1,
-# 50,847 in Sec. 5.2, 28,531 in Sec. 5.4, 82,382 hexahedra in Sec. 5.5 and 53,122 in Sec. 5.6, in two layers each.
+# Sizes are l/1.5, l/3, l/4 and l/5 for the length l = 0.1 mm, moved by at most 1 %. The extent of the fine elements and
+# the sizes away from the cracks are chosen so that the numbers of elements are within 3 % of the paper's: 11,140,
+# 18,967 and 28,784 in Table 1, 50,847 in Sec. 5.2 (l/4.5), 28,531 in Sec. 5.4, 82,382 hexahedra in Sec. 5.5 and 53,122
+# in Sec. 5.6, in two layers each.
 SHAPES: dict[str, Shape] = {
     "single_edge_notch": Shape(single_edge_notch_mesh, {
         "coarse": {"h": 0.1 / 1.5}, "M3": {"h": 0.0331}, "M4": {"h": 0.02505}, "M5": {"h": 0.0202},
         "coarse-mirror": {"h": 0.064, "symmetry": "mirror"}, "M3-mirror": {"h": 0.0331, "symmetry": "mirror"}}),
     "simple_shear": Shape(simple_shear_mesh, {
-        "coarse": {"h": 0.025, "half_width": 0.4}, "M4": {"h": 0.025, "half_width": 1.0},
-        "paper": {"h": 0.01765, "half_width": 4.0}}),
+        "coarse": {"h": 0.025, "half_width": 0.4}, "M4": {"h": 0.025},
+        "paper": {"h": 0.0222, "half_width": 5.0}}),
     "symmetric_double_edge_notch": Shape(symmetric_double_edge_notch_mesh, {
         "coarse": {"h": 0.1 / 3}, "mirror": {"h": 0.064, "symmetry": "mirror"}, "M4": {"h": 0.025},
         "paper": {"h": 0.02}}),

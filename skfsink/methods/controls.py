@@ -39,7 +39,7 @@ class ExplicitControls:
     estimate_change: float = 0.1
     energy_tolerance: float = 2e-5
     debris: str = "keep"
-    raised_mass: float = 0.0
+    raised_mass: float = 0.01
 
     def __post_init__(self) -> None:
         require("courant", self.courant, low=0, high=1, low_open=True)
@@ -130,7 +130,7 @@ class StaticsControls:
     tolerance: float = 1e-7
     gamma_tolerance: float = 1e-5
     increment: float = 0.01
-    front: float = 0.8
+    front: float = 0.95
     onset_tolerance: float = 5e-4
     max_newton: int = 40
     max_passes: int = 80

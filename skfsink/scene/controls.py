@@ -58,7 +58,7 @@ class Controls:
     overshoot: float = 0.005
     deletion: float = 1e-6
     force_floor: float = 1e-3
-    event_time: float = 2e-4
+    event_time: float = 4e-4
     aftermath: float = 1e-5
     record_every: float = 1e-6
     frame_every: float = 5e-6

@@ -133,7 +133,7 @@ class Options:
     kernels
         What evaluates the weak forms: "compiled" (element loops) or "forms" (scikit-fem, for small meshes).
     contact
-        The lips of a crack bear on each other instead of passing through; not with the integrator hht.
+        The lips of a crack bear on each other instead of passing through.
     bulk_viscosity_linear
         Linear coefficient b1 of the bulk viscosity of elements, in [0, 10]; typical 0.06.
     bulk_viscosity_quadratic

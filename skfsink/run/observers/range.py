@@ -63,8 +63,8 @@ def _check_widths(space: Space, raised: float) -> None:
     if share > raised:
         log.warning("an element near %s mm is %.2g mm narrow, most are %.2g mm (a share less than %g): it makes "
                     "the explicit step that much shorter for all; mend the mesh there, raise the mass of such elements "
-                    "(they fill %.1g of the volume: --raised-mass 0.01), or take --integrator hht",
-                    place_text(space.X[space.conn[e]].mean(axis=0)), widths[e], typical, NARROW, share)
+                    "(they fill %.1g of the volume: --raised-mass %.2g), or take --integrator hht",
+                    place_text(space.X[space.conn[e]].mean(axis=0)), widths[e], typical, NARROW, share, 1.1 * share)
 
 
 def check_onset(scene: Scene, state: State) -> None:

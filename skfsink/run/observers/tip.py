@@ -13,6 +13,7 @@ from typing import Any
 from ...errors import place_text
 from ...fem.indicators import corner_near
 from ...fem.space import Space
+from ...meshing.edge import ALONG
 from .range import SHARP
 
 __all__ = ["LATE", "SLOPE", "check_tip", "late", "thickness_for"]
@@ -21,7 +22,6 @@ log = logging.getLogger(__name__)
 
 SLOPE = 0.61  # delay of the onset, of the opening, over the thickness of the elements, of the radius of the tip
 LATE = 0.03   # of the opening, past which an onset is warned of
-ALONG = 6     # elements in a radius along a tip, with rings around it, which the curve finds enough
 
 
 def late(share: float) -> float:
