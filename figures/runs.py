@@ -8,9 +8,10 @@ The run `coarse` of each case keeps its summary only, as `coarse.json`.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
-__all__ = ["CASES", "COARSE", "FIGURES", "RUNS", "SCANS", "Run", "Scan", "key_of"]
+__all__ = ["CASES", "COARSE", "FIGURES", "FRONTS", "RUNS", "SCANS", "TRIED", "Run", "Scan", "key_of"]
 
 COARSE = "coarse"
 
@@ -33,11 +34,12 @@ class Run:
 
 @dataclass(frozen=True)
 class Scan:
-    """Runs of both analyses of one case, for `spread.csv`: names of the parameters, and their values for each run."""
+    """Runs of one case, for `spread.csv`: names of the parameters, and their values for each run."""
 
     case: str
     columns: tuple[str, ...]
     points: tuple[tuple[str | float, ...], ...]
+    analysis: str = "both"
 
 
 #: The cases in the order of the paper, and the mesh of each that the figures show.
@@ -87,13 +89,34 @@ FIGURES: dict[str, tuple[str, ...]] = {
     "fig11_quasistatic": tuple(names[1] for names in _BOTH.values()),
     "table1": tuple(name for name in _SINGLE if name.endswith("dynamic")),
     "energies": tuple(name for names in _BOTH.values() for name in names),
-    "spread": (),
 }
 
-_SEEDS = tuple(range(1, 6))
-#: Each is a column of `spread.png`, over the last of its parameters. Meshes other than the committed ones need gmsh.
-SCANS: tuple[Scan, ...] = (
-    Scan("simple_shear", ("mesh", "mesh_seed"), tuple(("M4", seed) for seed in _SEEDS)),
-    Scan("symmetric_double_edge_notch", ("mesh", "mesh_seed"), tuple(("M4", seed) for seed in _SEEDS)),
-    Scan("symmetric_double_edge_notch", ("mesh", "notch"), tuple(("M4", notch) for notch in (0.5, 0.625, 0.75))),
+_SEEDS, _THREE = tuple(range(10)), tuple(range(3))
+
+
+def _over(case: str, names: tuple[str, ...], sets: Iterable[tuple[str | float, ...]], seeds: tuple[int, ...],
+          analysis: str = "both") -> Scan:
+    """The sets of values of the parameters `names`, each on meshes of several seeds."""
+    return Scan(case, (*names, "mesh_seed"), tuple((*values, seed) for values in sets for seed in seeds), analysis)
+
+
+#: Each is a column of `spread.png` and rows of `spread.md`. Meshes other than the committed ones need gmsh.
+SCANS: tuple[Scan, ...] = tuple(_over(case, ("mesh",), ((mesh,),), _SEEDS) for case, mesh in (
+    ("single_edge_notch", "M4"), ("simple_shear", "M4"), ("symmetric_double_edge_notch", "M4"),
+    ("asymmetric_double_edge_notch", "M3")))
+#: Rows of `front.md`, and points of `front.png`: how many points a quasi-static pass fails, at two element sizes.
+FRONTS: tuple[Scan, ...] = tuple(
+    Scan(case, ("mesh", "front"), tuple((mesh, front) for mesh in meshes for front in (0.0, 0.5, 0.8, 0.9, 0.95, 1.0)),
+         "quasistatic")
+    for case, meshes in (("single_edge_notch", ("coarse", "M3")), ("simple_shear", ("coarse", "M4")),
+                         ("symmetric_double_edge_notch", ("mirror", "coarse")),
+                         ("asymmetric_double_edge_notch", ("coarse", "M3"))))
+#: The dimensions that the paper does not print, as they were tried: rows of `dimensions.md`.
+TRIED: tuple[Scan, ...] = (
+    _over("single_edge_notch", ("mesh", "notch"),
+          ((mesh, notch) for notch in (1.25, 1.5, 1.75) for mesh in ("M3", "M4")), _THREE, "dynamic"),
+    _over("symmetric_double_edge_notch", ("mesh", "notch"), (("M4", 0.4), ("M4", 0.6)), _THREE),
+    _over("asymmetric_double_edge_notch", ("mesh", "side", "notch", "offset"), (
+        ("M3", 4.0, 0.6, 1.0), ("M3", 5.0, 1.0, 1.25), ("M3", 5.0, 0.6, 1.5), ("M3", 5.0, 0.5, 1.25)), _THREE[:1],
+          "dynamic"),
 )

@@ -95,13 +95,13 @@ def plane_sample(ax: Axes, scene: Scene) -> float:
             continue
         ax.plot(*np.transpose([a, b]), color=INK, linewidth=1.6)
         direction = velocity / np.linalg.norm(velocity)
+        held = [name for name, v in zip("xyz", grip.velocity) if v == 0]
+        text = r"$\bar v$" + "".join(f", $u_{name}=0$" for name in held)
         if abs(direction @ outward) > 0.5:
-            held = [name for name, v in zip("xyz", grip.velocity) if v == 0]
-            text = r"$\bar v$" + "".join(f", $u_{name}=0$" for name in held)
             arrows(ax, a, b, direction, 0.1 * size, text)
         else:  # along the edge: one long arrow above it
             foot = (a + b) / 2 - 0.25 * size * direction + 0.06 * size * outward
-            arrows(ax, foot, foot, direction, 0.5 * size, r"$\bar v$, $u_y=0$")
+            arrows(ax, foot, foot, direction, 0.5 * size, text)
     ax.set(aspect="equal")
     ax.set_axis_off()
     return size

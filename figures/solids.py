@@ -29,7 +29,7 @@ def view(ax: Axes, ref: Reference, frame: Frame, camera: Camera, box: np.ndarray
          largest: float = 1.0) -> None:
     """The body in an axes that is `width` inches wide, at the scale of `box` [mm]; `largest` [m/s] for the speed."""
     scale = 1e3 if field == "speed" else 1.0
-    picture = render(ref.space, frame, camera, box, round(width * DPI), field, largest * scale)
+    picture = render(ref.space, frame, camera, box, round(width * DPI), field=field, largest=largest * scale)
     ax.imshow(picture, extent=(box[0, 0], box[1, 0], box[0, 1], box[1, 1]))
     ax.set(xlim=box[:, 0], ylim=box[:, 1], aspect="equal")
     ax.set_axis_off()

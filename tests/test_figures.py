@@ -27,6 +27,7 @@ for name in ("compute", "layout", "redraw", "runs", "sketch", "spread"):
 compute, layout, redraw, runs, sketch, spread = (sys.modules[name] for name in (
     "compute", "layout", "redraw", "runs", "sketch", "spread"))
 DPI = 60
+WITH_TABLE = ("table1", "energies", "spread", "front")
 SOLID = ("fig08_dog_bone", "fig10_cylindrical_shell", "fig11_quasistatic")
 
 
@@ -37,7 +38,7 @@ def references(tmp_path_factory: pytest.TempPathFactory) -> Path:
     fill(folder, tmp_path_factory.mktemp("runs"))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(reference, "reference_folder", lambda case, key="": folder / case / "reference" / key)
-        for i, scan in enumerate(runs.SCANS):
+        for i, scan in enumerate((*runs.SCANS, *runs.TRIED, *runs.FRONTS)):
             for j, point in enumerate(scan.points):
                 spread.append(scan, point, dict.fromkeys(spread.RESULTS, 0.03 + 0.001 * (i + j)))
     return folder
@@ -60,7 +61,7 @@ def nowhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 # --- drawing ---
 @pytest.mark.slow
-@pytest.mark.parametrize("name", runs.FIGURES)
+@pytest.mark.parametrize("name", [*runs.FIGURES, "spread", "front"])
 def test_every_figure_is_drawn_from_references(name: str, home: Path, tmp_path: Path,
                                                monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if a script asks for a run, a frame or a number that is not stored, or writes something else."""
@@ -73,7 +74,8 @@ def test_every_figure_is_drawn_from_references(name: str, home: Path, tmp_path: 
     with matplotlib.rc_context(plot.STYLE):
         module.draw(tmp_path / f"{name}.png")
     written = {path.name for path in tmp_path.iterdir()}
-    assert written == {f"{name}.png"} | ({f"{name}.md"} if name in ("table1", "energies") else set())
+    tables = {f"{name}.md"} if name in WITH_TABLE else set()
+    assert written == {f"{name}.png"} | tables | ({"dimensions.md"} if name == "spread" else set())
     picture = np.asarray(Image.open(tmp_path / f"{name}.png").convert("RGB")).astype(int)
     assert picture.shape[1] in (round(layout.WIDTH * DPI), round(3.4 * DPI))
     assert 0.02 < (picture.sum(axis=2) < 740).mean() < 0.9
@@ -86,7 +88,7 @@ def test_every_figure_is_drawn_from_references(name: str, home: Path, tmp_path: 
 def test_the_list_of_figures_is_that_of_the_scripts() -> None:
     scripts = {path.stem for path in FIGURES.glob("*.py") if path.stem.startswith("fig") or "def draw(" in
                path.read_text(encoding="utf-8")}
-    assert scripts == set(runs.FIGURES)
+    assert scripts == {*runs.FIGURES, "spread", "front"}
     known = {run.name for run in runs.RUNS}
     assert len(known) == len(runs.RUNS)
     assert all(need in known for needs in runs.FIGURES.values() for need in needs)
@@ -172,7 +174,9 @@ class Runner:
         if self.status:
             stdout.write("skfsink: some reason\n")
         else:
-            part = {"elements": 7, "event": {"max_branches": 2}, "energy": {
+            part = {"elements": 7, "event": {"max_branches": 2, "first_arrival_s": 1e-4, "first_arrival_pass": None,
+                                             "mean_tip_speed_m_per_s": 25.0}, "cost": {"steps": 100},
+                    "onset": {"displacement_mm": 0.12, "elastic_energy": 0.05}, "energy": {
                 f"{name}_{when}": 0.03 for name in ("U_paper", "D_sink") for when in ("at_arrival", "final")}}
             (folder / "summary.json").write_text(json.dumps({"case": "x", "analysis": "both", "dynamic": part,
                                                              "quasistatic": part}))
@@ -218,14 +222,14 @@ def test_the_tables_of_the_scans_grow_by_what_is_missing(nowhere: Path, monkeypa
     runner = Runner()
     monkeypatch.setattr(compute.subprocess, "run", runner)
     spread.append(spread.SCANS[0], ("M4", 2), dict.fromkeys(spread.RESULTS, 1.0))
-    assert spread.run_scans(1) == [] and len(runner.commands) == 2
+    assert spread.run_scans(spread.SCANS, 1) == [] and len(runner.commands) == 2
     assert runner.commands[0][3:9] == ["--mesh", "M4", "--mesh-seed", "1", "--analysis", "both"]
-    assert spread.run_scans(1) == [] and len(runner.commands) == 2
+    assert spread.run_scans(spread.SCANS, 1) == [] and len(runner.commands) == 2
     assert [row["mesh_seed"] for row in spread.rows_of(spread.SCANS[0])] == ["1", "2"]
     (row,) = spread.rows_of(spread.SCANS[1])
     assert (row["notch"], row["mesh_seed"], row["U_dynamic_at_arrival"], row["elements"]) == ("1.5", "", "0.03", "7")
     lines = (nowhere / "simple_shear" / "reference" / "spread.csv").read_text().splitlines()
-    assert len(lines) == 4 and lines[0].startswith("mesh,mesh_seed,notch,U_dynamic_at_arrival")
+    assert len(lines) == 4 and lines[0].startswith("mesh,mesh_seed,notch,elements,onset_mm")
 
 
 @pytest.mark.parametrize("text", ["a,b\n1,2\n", "mesh\nM4,3,4\n"])

@@ -1,8 +1,9 @@
 """The small plates of the studies, 2 x 2 mm with a notch of 0.5 mm: `python -m skfsink.study.meshes` makes them.
 
-`plate` is unstructured, `half` is the lower half of a plate with the symmetry line as its boundary `seam`, and `slit`
-is such a half whose notch has no width. A number is the seed of another mesh of the same sizes, `fine` has elements
-of l/4 instead of l/2. They are committed in `cases/study/meshes`; making them needs gmsh.
+`plate` is unstructured, `tip` is like it but for rings of small elements around the tip, `half` is the lower half of a
+plate with the symmetry line as its boundary `seam`, and `slit` is such a half whose notch has no width. A number is the
+seed of another mesh of the same sizes, `fine` has elements of l/4 instead of l/2.
+They are committed in `cases/study/meshes`; making them needs gmsh.
 """
 
 from __future__ import annotations
@@ -81,7 +82,9 @@ def main() -> None:
     folder.mkdir(parents=True, exist_ok=True)
     made = {}
     for seed in range(3):
-        made[f"plate{seed}"] = single_edge_notch_mesh(side=SIDE, notch=NOTCH, h=0.05, half_height=0.5, seed=seed)
+        for name, h_tip in (("plate", 0.0), ("tip", None)):
+            made[f"{name}{seed}"] = single_edge_notch_mesh(side=SIDE, notch=NOTCH, h=0.05, h_tip=h_tip, half_height=0.5,
+                                                           seed=seed)
         made[f"half{seed}"] = half_plate_mesh(seed=seed)
         made[f"slit{seed}"] = half_plate_mesh(notch_width=0.0, seed=seed)
     made["half_fine"] = half_plate_mesh(h=0.025)

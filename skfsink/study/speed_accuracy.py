@@ -27,6 +27,7 @@ from .chart import page
 from .integrators import TIME
 from .models import MODEL
 from .part import Part, Points
+from .raised import RAISED
 from .refinement import SPACE
 from .solvers import SOLVERS
 from .store import Store
@@ -34,11 +35,11 @@ from .tolerance import TOLERANCE
 
 __all__ = ["PARTS", "run_parts", "speed_accuracy"]
 
-PARTS: dict[str, Part] = {part.name: part for part in (TIME, TOLERANCE, SPACE, MODEL, SOLVERS)}
+PARTS: dict[str, Part] = {part.name: part for part in (TIME, TOLERANCE, RAISED, SPACE, MODEL, SOLVERS)}
 FLAG = Parameter(negative="", show_default=False)
 
 
-def speed_accuracy(*, only: Literal["time", "tolerance", "space", "model", "solvers"] | None = None,
+def speed_accuracy(*, only: Literal["time", "tolerance", "raised", "space", "model", "solvers"] | None = None,
                    quick: Annotated[bool, FLAG] = False, fresh: Annotated[bool, FLAG] = False,
                    out: Path = Path("results/study/speed_accuracy"), quiet: Annotated[bool, FLAG] = False) -> None:
     """Measure what each method costs and how far it is off, and chart one against the other.
@@ -46,7 +47,8 @@ def speed_accuracy(*, only: Literal["time", "tolerance", "space", "model", "solv
     Parameters
     ----------
     only
-        One part of the study: integrators, rejected steps, meshes and elements, the model, or linear solvers.
+        One part of the study: integrators, rejected steps, raised mass, meshes and elements, the model, or linear
+        solvers.
     quick
         Fewer points, in less than three minutes.
     fresh
