@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import paper
-from layout import BLUE, RED, WIDTH, save, script, title
+from layout import ANALYSES, RED, WIDTH, save, script, title
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from runs import CASES, key_of
@@ -15,8 +15,6 @@ from runs import CASES, key_of
 from skfsink.results import reference
 from skfsink.results.reference import Reference
 from skfsink.system.files import write_atomic
-
-ANALYSES = {"dynamic": ("dynamic", RED), "quasistatic": ("quasi-static", BLUE)}
 
 
 def draw(path: Path) -> None:

@@ -22,12 +22,13 @@ from skfsink.pictures import plot
 from skfsink.results.reference import Reference
 from skfsink.system.files import write_atomic
 
-__all__ = ["BLUE", "DPI", "RED", "WIDTH", "Panel", "densities", "dissipation", "microseconds", "save", "script",
-           "start", "title"]
+__all__ = ["ANALYSES", "BLUE", "DPI", "RED", "WIDTH", "Panel", "densities", "dissipation", "microseconds", "save",
+           "script", "start", "title"]
 
 WIDTH, DPI = plot.WIDTH, plot.DPI
 LARGEST = 950_000  # of a file [bytes]
 RED, BLUE = "#a63d40", "#33658a"
+ANALYSES = {"dynamic": ("dynamic", RED), "quasistatic": ("quasi-static", BLUE)}  # as called, and coloured
 Panel = tuple[Reference, deformed.Frame, str]  # what is drawn, and the words above it
 HERE = Path(__file__).resolve().parent
 

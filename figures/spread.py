@@ -20,7 +20,7 @@ import numpy as np
 import paper
 from compute import ROOT, finish, in_parallel
 from cyclopts import App, Parameter
-from layout import BLUE, RED, WIDTH, save, start
+from layout import ANALYSES, WIDTH, save, start
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from runs import FRONTS, SCANS, TRIED, Scan
@@ -31,7 +31,6 @@ from skfsink.results import reference
 from skfsink.system.files import write_atomic
 
 TABLE = "spread.csv"
-ANALYSES = {"dynamic": ("dynamic", RED), "quasistatic": ("quasi-static", BLUE)}
 MEASURED = {"U_{}_at_arrival": ("energy", "U_paper_at_arrival"), "U_{}_final": ("energy", "U_paper_final"),
             "D_{}_at_arrival": ("energy", "D_sink_at_arrival"), "D_{}_final": ("energy", "D_sink_final"),
             "arrival_s_{}": ("event", "first_arrival_s"), "arrival_pass_{}": ("event", "first_arrival_pass"),

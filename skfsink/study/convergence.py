@@ -32,8 +32,8 @@ from ..run.display import Display
 from ..run.quantities import crack_cells, measured
 from ..run.simulate import Simulation
 from ..scene.options import Options
-from ..scene.registry import find_case
 from .chart import page
+from .ladder import scene_of
 from .part import Part, Planned, Points
 from .rates import extrapolated
 from .speed_accuracy import run_parts
@@ -51,14 +51,13 @@ QUANTITIES = {"onset_displacement": ("onset: displacement of a grip (mm)", 4), "
 FLAG = Parameter(negative="", show_default=False)
 
 
-def run_event(case: str, arguments: dict[str, Any]) -> dict[str, Any]:
+def run_event(case: str, mesh: str, **dimensions: Any) -> dict[str, Any]:
     """The dynamic event of a case: its :func:`.measured` quantities, those of its crack, its elements and steps.
 
     `crack_length` [mm] is that of all branches up to the first arrival: squares of side l that the crack goes through,
     times l. `first_branch` [mm] is where the leading tip is when a second branch appears, None if there is none.
     """
-    found = find_case(case)
-    scene = found.scene({**found.default_arguments, **arguments}, Options(frame_every=5e-5))
+    scene, _ = scene_of(case, Options(frame_every=5e-5), mesh, **dimensions)
     with tempfile.TemporaryDirectory() as folder, Display(quiet=True) as display:
         simulation = Simulation(scene, Path(folder), display)
         state = simulation.run()
@@ -90,7 +89,7 @@ class Event:
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "plate.vtu"
             write_mesh(path, single_edge_notch_mesh(h=L / self.per_length, half_height=HALF_HEIGHT, seed=self.seed))
-            return run_event("single_edge_notch", {"mesh": str(path)})
+            return run_event("single_edge_notch", str(path))
 
 
 def plan(quick: bool) -> list[Planned]:
@@ -102,7 +101,7 @@ def plan(quick: bool) -> list[Planned]:
 
 def plan_layers(quick: bool) -> list[Planned]:
     """The dog-bone with two, three and four layers; none if quick."""
-    return [] if quick else [Planned(f"{n}", partial(run_event, "dog_bone", {"mesh": "coarse", "layers": n}), 40.0 * n)
+    return [] if quick else [Planned(f"{n}", partial(run_event, "dog_bone", "coarse", layers=n), 40.0 * n)
                              for n in (2, 3, 4)]
 
 

@@ -20,11 +20,10 @@ from .chart import page
 from .meshes import load_plate
 from .part import Part, Planned, Points
 from .plate import Plate, warm
+from .tolerance import DISTURBED, SEEDS, errors_of
 
 __all__ = ["RAISED", "summary"]
 
-SEEDS = ("0", "1", "2")
-DISTURBED = (0.99, 1.0, 1.01)  # of the Courant number
 DEFAULT = ExplicitControls.raised_mass
 #: mesh, and share of the volume whose elements get more mass
 METHODS = {"reference": ("tip", 0.0), "0.001": ("tip", 0.001), "0.003": ("tip", 0.003), "0.01": ("tip", 0.01),
@@ -51,18 +50,14 @@ class _Run:
     def __call__(self) -> dict[str, Any]:
         """Times [us] of the first quarter of the way and of the rest, energies, steps, mass added and cost."""
         warm(2)
-        made = []
         plate = _plate(self.mesh, self.seed)
-
-        def make(plate: Plate) -> Any:
-            made.append(plate.explicit(self.controls))
-            return made[0]
-
-        found = plate.event(make)
+        onset = plate.onset_figures["opening_mm"]
+        scheme = plate.explicit(self.controls)
+        found = plate.event(lambda _: scheme)
         start = float(found["passed_us"][len(found["passed_us"]) // 4 - 1])
         return {**{name: found[name] for name in ("D", "U", "steps", "rejected", "cpu_s")}, "start": start,
-                "transit": found["arrival_us"] - start, "added_mass": made[0].added_mass,
-                "onset_mm": plate.onset_figures["opening_mm"], "elements": plate.sample.space.n_elements}
+                "transit": found["arrival_us"] - start, "added_mass": scheme.added_mass,
+                "onset_mm": onset, "elements": plate.sample.space.n_elements}
 
 
 def plan(quick: bool) -> list[Planned]:
@@ -91,8 +86,7 @@ def summary(points: Points) -> list[dict[str, Any]]:
         for name, key in (("steps", "steps"), ("cost", "cpu_s"), ("added", "added_mass"), ("onset", "onset_mm")):
             row[name] = float(np.mean([point[key] for _, point in runs]))
         for name in MEASURES:
-            true = {seed: np.mean([p[name] for s, p in groups["reference"] if s == seed]) for seed, _ in runs}
-            errors = np.array([point[name] / true[seed] - 1 for seed, point in runs])
+            errors = errors_of(runs, groups["reference"], name)
             sure = float(errors.std(ddof=1) / np.sqrt(len(errors))) if len(errors) > 1 else 0.0
             row[name] = float(errors.mean()), sure, float(np.sqrt(np.mean(errors**2)))
         rows.append(row)

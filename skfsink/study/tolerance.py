@@ -7,6 +7,7 @@ differ by 1 %. The reference of a mesh is the mean of three such runs with an ei
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -21,7 +22,7 @@ from .meshes import load_plate
 from .part import Part, Planned, Points
 from .plate import Plate, warm
 
-__all__ = ["TOLERANCE", "summary"]
+__all__ = ["DISTURBED", "SEEDS", "TOLERANCE", "errors_of", "summary"]
 
 RUNS = {"aaa": 1.0, "gent": 0.5}     # how far the crack runs in each law [mm]
 SECONDS = {"aaa": 1.0, "gent": 3.0}  # of a run, about
@@ -33,6 +34,9 @@ METHODS = {"reference": (0.125, 2e-6), "off": (1.0, 0.0), "1e-04": (1.0, 1e-4), 
            "2e-06": (1.0, 2e-6)}
 #: what is compared: how it is called
 MEASURES = {"arrival_us": "arrival time", "D": "$D$ at the arrival", "U": "$U$ at the arrival"}
+
+
+Runs = Sequence[tuple[str, dict[str, Any]]]  # the mesh, and what came out
 
 
 @cache
@@ -68,6 +72,12 @@ def plan(quick: bool) -> list[Planned]:
 
 
 # --- what comes out ---
+def errors_of(runs: Runs, reference: Runs, name: str) -> np.ndarray:
+    """Errors (n,) of a measure in some runs, relative to the mean of the reference's runs on the same mesh."""
+    true = {seed: np.mean([p[name] for s, p in reference if s == seed]) for seed, _ in runs}
+    return np.array([point[name] / true[seed] - 1 for seed, point in runs])
+
+
 def summary(points: Points) -> list[dict[str, Any]]:
     """A row a law and method: mean `steps`, `rejected`, `cost` [s]; of each measure (mean, root mean square) errors.
 
@@ -90,8 +100,7 @@ def summary(points: Points) -> list[dict[str, Any]]:
         for name in ("steps", "rejected"):
             row[name] = float(np.mean([point[name] for _, point in runs]))
         for name in MEASURES:
-            true = {seed: np.mean([p[name] for s, p in groups[law, "reference"] if s == seed]) for seed, _ in runs}
-            errors = np.array([point[name] / true[seed] - 1 for seed, point in runs])
+            errors = errors_of(runs, groups[law, "reference"], name)
             row[name] = float(errors.mean()), float(np.sqrt(np.mean(errors**2)))
         rows.append(row)
     return rows
