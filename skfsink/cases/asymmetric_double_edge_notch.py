@@ -18,9 +18,9 @@ from ..units import Unit
 __all__ = ["asymmetric_double_edge_notch"]
 
 ASSUMED = (
-    "side 4 mm: the paper prints no length; 28,531 elements of size l/5 in the fine part fit it",
-    "notches 0.6 mm long: not printed; the cracks then branch and bridge as the paper describes",
-    "offset 1 mm between the heights of the notches, half of it on each side of mid-height: not printed",
+    "side 5 mm: the paper prints no length; 28,531 elements of size l/4.5 in the fine part fit it",
+    "notches 0.5 mm long: not printed; the cracks then branch and bridge as the paper describes",
+    "offset 1.25 mm between the heights of the notches, half of it on each side of mid-height: not printed",
     "the mesh of one half is that of the other turned by half a turn, so that both notches have the same elements",
     "notches 0.1 mm = l wide with round tips: not printed",
 )
@@ -28,10 +28,10 @@ ASSUMED = (
 
 def asymmetric_double_edge_notch(
         *,
-        side: Annotated[float, SAMPLE, Unit("mm")] = 4.0,
-        notch: Annotated[float, SAMPLE, Unit("mm")] = 0.6,
+        side: Annotated[float, SAMPLE, Unit("mm")] = 5.0,
+        notch: Annotated[float, SAMPLE, Unit("mm")] = 0.5,
         notch_width: Annotated[float, SAMPLE, Unit("mm")] = 0.1,
-        offset: Annotated[float, SAMPLE, Unit("mm")] = 1.0,
+        offset: Annotated[float, SAMPLE, Unit("mm")] = 1.25,
         mesh: Annotated[str, SAMPLE] = "M3",
         mesh_seed: Annotated[int, SAMPLE] = 0,
         options: Options = Options(),  # noqa: B008
@@ -52,7 +52,7 @@ def asymmetric_double_edge_notch(
     offset
         Height of the right notch above the left one [mm], in [0, side - 2 notch-width).
     mesh
-        "coarse", "M3", "paper" (element size l/1.5, l/3, l/5), or the path of a mesh file.
+        "coarse", "M3", "M4", "paper" (element size l/2, l/3, l/4, l/4.5), or the path of a mesh file.
     mesh_seed
         Another mesh of the same sizes for each number; other than 0 it needs gmsh (the mesh extra).
     options

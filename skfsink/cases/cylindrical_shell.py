@@ -24,7 +24,7 @@ ASSUMED = (
     "length 5 mm: the paper prints the inner radius and the thickness only",
     "slit 1 mm long along the circumference, at the crown and at mid-length, 0.1 mm = l wide with round ends: "
     "not printed",
-    "element size l/4 within 1.2 mm of mid-length, two layers: chosen to meet 53,122 elements",
+    "element size l/4 within 1.18 mm of mid-length, two layers: chosen to meet 53,122 elements",
     "the two halves of the mesh are mirror images of each other",
 )
 

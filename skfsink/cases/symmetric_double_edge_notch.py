@@ -50,8 +50,8 @@ def symmetric_double_edge_notch(
     notch_width
         Width of the notches [mm], in (0, side).
     mesh
-        "coarse", "mirror" (mirror-symmetric), "M4", "paper" (element size l/3, l/1.5, l/4, l/5), or the path of a
-        mesh file.
+        "coarse", "mirror" (mirror-symmetric), "M4", "paper", "M8" (element size l/3, l/1.5, l/4, l/5, l/8), or the path
+        of a mesh file.
     mesh_seed
         Another mesh of the same sizes for each number; other than 0 it needs gmsh (the mesh extra).
     options

@@ -2,8 +2,7 @@
 
 Each sample has a function that returns its mesh; its keyword arguments are the sample's dimensions [mm], the element
 sizes and the `seed`. `h_tip` is the size of the elements along the round tips of notches, around which elements are
-laid in rings (see :mod:`.ring`); None is a sixth of its radius, and with 0, the default of the
-asymmetric plate and of the shell, there are no rings.
+laid in rings (see :mod:`.ring`); None is a sixth of its radius, and with 0 there are no rings.
 Three-dimensional samples are meshed as a section, which :mod:`.sweeping` turns into hexahedra. The meshes in
 `cases/<sample>/meshes` are from `python -m skfsink.meshing.shapes <sample> [--mesh M3]` and gmsh 4.15.2.
 """
@@ -97,9 +96,9 @@ def symmetric_double_edge_notch_mesh(*, side: float = 3.0, notch: float = 0.45, 
     return _double_edge_notched(side, _Notch(notch, notch_width, h_tip), 0.0, size=size, symmetry=symmetry, seed=seed)
 
 
-def asymmetric_double_edge_notch_mesh(*, side: float = 4.0, notch: float = 0.6, notch_width: float = 0.1,
-                                      offset: float = 1.0, h: float = 0.025, h_coarse: float = 0.11,
-                                      h_tip: float | None = 0.0, half_height: float = 1.35, symmetry: str = "turn",
+def asymmetric_double_edge_notch_mesh(*, side: float = 5.0, notch: float = 0.5, notch_width: float = 0.1,
+                                      offset: float = 1.25, h: float = 0.025, h_coarse: float = 0.11,
+                                      h_tip: float | None = None, half_height: float = 1.25, symmetry: str = "turn",
                                       distance: Distance | None = None, seed: int = 0) -> meshio.Mesh:
     """Mesh the square plate [0, side]^2 with a notch from each side, the right one higher by `offset`.
 
@@ -146,7 +145,7 @@ def dog_bone_mesh(*, length: float = 10.0, gauge_length: float = 4.0, gauge_widt
 
 def cylindrical_shell_mesh(*, inner_radius: float = 1.9, thickness: float = 0.1, length: float = 5.0,
                            notch: float = 1.0, notch_width: float = 0.1, h: float = 0.025, h_coarse: float = 0.11,
-                           h_tip: float | None = 0.0, half_height: float = 1.2, distance: Distance | None = None,
+                           h_tip: float | None = None, half_height: float = 1.2, distance: Distance | None = None,
                            seed: int = 0) -> meshio.Mesh:
     """Mesh the unrolled mid-surface of a half cylinder, [0, pi r] x [0, length], with a slit in its middle.
 
@@ -286,8 +285,8 @@ class Shape(NamedTuple):
 
 # Sizes are l/1.5, l/3, l/4 and l/5 for the length l = 0.1 mm, moved by at most 1 %. The extent of the fine elements and
 # the sizes away from the cracks are chosen so that the numbers of elements are within 3 % of the paper's: 11,140,
-# 18,967 and 28,784 in Table 1, 50,847 in Sec. 5.2 (l/4.5), 28,531 in Sec. 5.4, 82,382 hexahedra in Sec. 5.5 and 53,122
-# in Sec. 5.6, in two layers each.
+# 18,967 and 28,784 in Table 1, 50,847 in Sec. 5.2 and 28,531 in Sec. 5.4 (both l/4.5), 82,382 hexahedra in Sec. 5.5
+# and 53,122 in Sec. 5.6, in two layers each.
 SHAPES: dict[str, Shape] = {
     "single_edge_notch": Shape(single_edge_notch_mesh, {
         "coarse": {"h": 0.1 / 1.5}, "M3": {"h": 0.0331}, "M4": {"h": 0.02505}, "M5": {"h": 0.0202},
@@ -297,13 +296,13 @@ SHAPES: dict[str, Shape] = {
         "paper": {"h": 0.0222, "half_width": 5.0}}),
     "symmetric_double_edge_notch": Shape(symmetric_double_edge_notch_mesh, {
         "coarse": {"h": 0.1 / 3}, "mirror": {"h": 0.064, "symmetry": "mirror"}, "M4": {"h": 0.025},
-        "paper": {"h": 0.02}}),
+        "paper": {"h": 0.02}, "M8": {"h": 0.0125}}),
     "asymmetric_double_edge_notch": Shape(asymmetric_double_edge_notch_mesh, {
-        "coarse": {"h": 0.1 / 1.5}, "M3": {"h": 0.1 / 3}, "paper": {"h": 0.02}}),
+        "coarse": {"h": 0.05}, "M3": {"h": 0.1 / 3}, "M4": {"h": 0.025}, "paper": {"h": 0.0222}}),
     "dog_bone": Shape(dog_bone_mesh, {
         "coarse": {"h": 0.1 / 1.5}, "paper": {"h": 0.02, "h_coarse": 0.0265}}),
     "cylindrical_shell": Shape(cylindrical_shell_mesh, {
-        "coarse": {"h": 0.1 / 1.5}, "paper": {"h": 0.025}}),
+        "coarse": {"h": 0.1 / 1.5}, "paper": {"h": 0.025, "half_height": 1.18}}),
 }
 
 
