@@ -1,5 +1,7 @@
 """How many points a quasi-static pass fails: U, D and passes of the plane scenes over `front`, text and picture.
 
+Beside them stand over-damped events of one plate, which come to the same limit in another way.
+
 Drawn from `cases/<case>/reference/spread.csv`; the runs are made by `spread.py --compute`.
 """
 
@@ -11,7 +13,7 @@ import numpy as np
 import paper
 from layout import BLUE, RED, WIDTH, save, script
 from matplotlib.figure import Figure
-from runs import FRONTS
+from runs import FRONTS, OVERDAMPED
 from spread import Row, rows_of, values
 
 from skfsink.errors import OutputError
@@ -25,7 +27,8 @@ def draw(path: Path) -> None:
     found = {scan.case: rows_of(scan) for scan in FRONTS}
     if empty := [case for case, rows in found.items() if not rows]:
         raise OutputError(f"case {empty[0]} has no rows over front in its spread.csv")
-    write_atomic(path.with_suffix(".md"), table(found))
+    creeping = rows_of(OVERDAMPED)
+    write_atomic(path.with_suffix(".md"), table(found) + overdamped_table(found[OVERDAMPED.case], creeping))
     figure = Figure((WIDTH, 2.9), layout="constrained")
     axes = figure.subplots(1, len(found), sharey=True)
     for ax, letter, (case, rows) in zip(axes, "abcd", found.items()):
@@ -35,11 +38,17 @@ def draw(path: Path) -> None:
                 y = values(these, column)
                 ax.plot(values(these, "front"), y / y[-1], line + mark, color=colour, markersize=3, linewidth=1,
                         label=f"${name}$, {'smaller' if line == '-' else 'larger'} elements")
+            for row in creeping:  # U of over-damped events on the same mesh
+                if (case, mesh) == (OVERDAMPED.case, row["mesh"]):
+                    U = values(these, QUANTITIES["U"][0])[-1]
+                    ax.plot(1.0, float(row["U_dynamic_at_arrival"]) / U, "*", color="k", markersize=5,
+                            label="$U$, over-damped")
         ax.axhspan(0.97, 1.03, color="0.9")
         ax.set_title(f"({letter}) {paper.SHORT[case].replace(chr(10), ' ')}", loc="left")
         ax.set_xlabel("front")
     axes[0].set_ylabel("over the value at the last front")
-    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
+    handles = {label: handle for ax in axes for handle, label in zip(*ax.get_legend_handles_labels())}
+    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=3)
     save(figure, path)
 
 
@@ -57,6 +66,23 @@ def table(found: dict[str, list[Row]]) -> str:
                 cells = [f"{float(these[f][column]):.{digits}f}" if f in these and np.isfinite(float(these[f][column]))
                          else "–" for f in fronts]
                 lines.append(f"| {paper.TITLES[case]} | {mesh} | {name} | " + " | ".join(cells) + " |")
+    return "\n".join([*lines, ""])
+
+
+def overdamped_table(fronts: list[Row], creeping: list[Row]) -> str:
+    """Over-damped events, and below them the quasi-static analysis of the same mesh that fails the fewest points."""
+    lines = ["", f"The limit by motion, {paper.TITLES[OVERDAMPED.case]}: so viscous that the crack creeps, with grips "
+             "that go on moving.", "", "| | mesh | *U* | *D* | work of the grips | branches |", "|" + "---|" * 6]
+    rows = [(f"{1e6 * float(row['viscosity']):g} Pa s, {float(row['speed']):g} mm/s", row, "dynamic")
+            for row in creeping]
+    mesh = OVERDAMPED.points[0][0]
+    last = max((row for row in fronts if row["mesh"] == mesh), key=lambda row: float(row["front"]), default=None)
+    if last is not None:
+        rows.append((f"quasi-static, front {float(last['front']):g}", last, "quasistatic"))
+    for name, row, kind in rows:
+        energies = [f"{float(row[column]):.4f}" for column in (
+            f"U_{kind}_at_arrival", f"D_{kind}_at_arrival", f"work_{kind}")]
+        lines.append(f"| {name} | {row['mesh']} | {' | '.join(energies)} | {float(row[f'branches_{kind}']):g} |")
     return "\n".join([*lines, ""])
 
 

@@ -23,7 +23,8 @@ from cyclopts import App, Parameter
 from layout import ANALYSES, WIDTH, save, start
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from runs import FRONTS, SCANS, TRIED, Scan
+from matplotlib.ticker import MaxNLocator
+from runs import FRONTS, OVERDAMPED, SCANS, TRIED, Scan
 
 from skfsink.errors import OutputError, require
 from skfsink.pictures import plot
@@ -33,6 +34,7 @@ from skfsink.system.files import write_atomic
 TABLE = "spread.csv"
 MEASURED = {"U_{}_at_arrival": ("energy", "U_paper_at_arrival"), "U_{}_final": ("energy", "U_paper_final"),
             "D_{}_at_arrival": ("energy", "D_sink_at_arrival"), "D_{}_final": ("energy", "D_sink_final"),
+            "work_{}": ("energy", "external_work"),
             "arrival_s_{}": ("event", "first_arrival_s"), "arrival_pass_{}": ("event", "first_arrival_pass"),
             "tip_speed_{}": ("event", "mean_tip_speed_m_per_s"), "branches_{}": ("event", "max_branches"),
             "steps_{}": ("cost", "steps")}
@@ -190,8 +192,8 @@ def draw(path: Path) -> None:
     if empty := [scan for scan, rows in found.items() if not rows]:
         raise OutputError(f"case {empty[0].case} has no rows over {empty[0].columns[-1]} in its {TABLE}")
     write_atomic(path.with_suffix(".md"), spread_table(found))
-    tried = {scan: rows for scan in TRIED if (rows := rows_of(scan))}
-    write_atomic(path.with_name("dimensions.md"), tried_table(tried))
+    if tried := {scan: rows for scan in TRIED if (rows := rows_of(scan))}:
+        write_atomic(path.with_name("dimensions.md"), tried_table(tried))
     figure = Figure((WIDTH, 5.6), layout="constrained")
     axes = figure.subplots(3, len(found), squeeze=False, sharey="row", height_ratios=[3, 3, 2])
     for i, (scan, rows) in enumerate(found.items()):
@@ -228,7 +230,8 @@ def _column(axes: Sequence[Axes], scan: Scan, rows: list[Row]) -> None:
     axes[2].axhline(1.0, color="k", linewidth=0.5)
     axes[2].set_xlabel(f"number of the mesh ({rows[0]['mesh']})")
     for ax in axes:
-        ax.margins(x=0.1)
+        ax.set_xlim(-0.7, len(scan.points) - 0.3)
+        ax.xaxis.set_major_locator(MaxNLocator(integer=True))
         ax.tick_params(labelbottom=ax is axes[2])
 
 
@@ -255,7 +258,7 @@ def main(*, compute: Annotated[bool, Parameter(negative="")] = False, jobs: int 
         File to write, spread.png beside this script unless given.
     """
     jobs = int(require("jobs", jobs, low=1, high=64, whole=True))
-    failed = run_scans((*SCANS, *TRIED, *FRONTS), jobs) if compute else []
+    failed = run_scans((*SCANS, *TRIED, *FRONTS, OVERDAMPED), jobs) if compute else []
     for line in failed:
         print("skfsink:", line, file=sys.stderr)
     with matplotlib.rc_context(plot.STYLE):

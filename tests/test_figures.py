@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import importlib
+import importlib.util
 import json
 import subprocess
 import sys
@@ -22,10 +22,10 @@ from skfsink.errors import OutputError, ParameterError
 from skfsink.pictures import plot
 from skfsink.results import reference
 
-for name in ("compute", "layout", "redraw", "runs", "sketch", "spread"):
+for name in ("compute", "everything", "layout", "redraw", "runs", "sketch", "spread"):
     importlib.import_module(name)
-compute, layout, redraw, runs, sketch, spread = (sys.modules[name] for name in (
-    "compute", "layout", "redraw", "runs", "sketch", "spread"))
+compute, everything, layout, redraw, runs, sketch, spread = (sys.modules[name] for name in (
+    "compute", "everything", "layout", "redraw", "runs", "sketch", "spread"))
 DPI = 60
 WITH_TABLE = ("table1", "energies", "spread", "front")
 SOLID = ("fig08_dog_bone", "fig10_cylindrical_shell", "fig11_quasistatic")
@@ -38,7 +38,7 @@ def references(tmp_path_factory: pytest.TempPathFactory) -> Path:
     fill(folder, tmp_path_factory.mktemp("runs"))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(reference, "reference_folder", lambda case, key="": folder / case / "reference" / key)
-        for i, scan in enumerate((*runs.SCANS, *runs.TRIED, *runs.FRONTS)):
+        for i, scan in enumerate((*runs.SCANS, *runs.TRIED, *runs.FRONTS, runs.OVERDAMPED)):
             for j, point in enumerate(scan.points):
                 spread.append(scan, point, dict.fromkeys(spread.RESULTS, 0.03 + 0.001 * (i + j)))
     return folder
@@ -177,7 +177,8 @@ class Runner:
             part = {"elements": 7, "event": {"max_branches": 2, "first_arrival_s": 1e-4, "first_arrival_pass": None,
                                              "mean_tip_speed_m_per_s": 25.0}, "cost": {"steps": 100},
                     "onset": {"displacement_mm": 0.12, "elastic_energy": 0.05}, "energy": {
-                f"{name}_{when}": 0.03 for name in ("U_paper", "D_sink") for when in ("at_arrival", "final")}}
+                "external_work": 0.04, **{f"{name}_{when}": 0.03 for name in ("U_paper", "D_sink")
+                                          for when in ("at_arrival", "final")}}}
             (folder / "summary.json").write_text(json.dumps({"case": "x", "analysis": "both", "dynamic": part,
                                                              "quasistatic": part}))
         return SimpleNamespace(returncode=self.status)
@@ -212,6 +213,53 @@ def test_compute_stores_what_it_has_run(nowhere: Path, monkeypatch: pytest.Monke
     assert reference.load_coarse("dog_bone")["analysis"] == "both"
     monkeypatch.setattr(compute.subprocess, "run", Runner(1))
     assert len(compute.compute([run for run in runs.RUNS if run.case == "simple_shear"], 1)) == 3
+
+
+# --- everything ---
+def test_everything_runs_its_steps_and_copies_what_they_leave(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fails if a step is left out, goes on after one that failed, or its files are not where the pages have them."""
+    done: list[tuple[str, ...]] = []
+    monkeypatch.setattr(everything, "ROOT", tmp_path)
+
+    def fake(command: list[str], **_: Any) -> SimpleNamespace:
+        done.append(tuple(command[1:]))
+        for step in everything.STEPS.values():
+            if step.arguments == tuple(command[1:][:len(step.arguments)]):
+                for name, place in step.copies.items():
+                    (tmp_path / step.folder / name).parent.mkdir(parents=True, exist_ok=True)
+                    (tmp_path / step.folder / name).write_text(f"{step.name}/{name}")
+                    (tmp_path / place).parent.mkdir(parents=True, exist_ok=True)
+        return SimpleNamespace(returncode=3 if "figures/front.py" in command else 0)
+
+    monkeypatch.setattr(everything.subprocess, "run", fake)
+    with pytest.raises(OutputError, match=r"step front ended with status 3: python figures/front.py"):
+        everything.main(jobs=2)
+    assert done == [("figures/redraw.py", "--compute", "--jobs", "2"),
+                    ("figures/spread.py", "--compute", "--jobs", "2"), ("figures/front.py",)]
+    done.clear()
+    everything.main(only=("notch", "ladder"))
+    assert [words[1] for words in done] == ["skfsink.study.notch", "skfsink.study.ladder"]
+    assert (tmp_path / "docs/images/notch.png").read_text() == "notch/notch.png"
+    assert (tmp_path / "cases/dog_bone/ladder.json").read_text() == "ladder/dog_bone/ladder.json"
+    done.clear()
+    everything.main(plan=True)
+    assert not done
+    with pytest.raises(ParameterError, match="--only must be one of scenes, spread"):
+        everything.main(only=("figures",))
+    monkeypatch.setattr(everything.subprocess, "run", lambda *_, **__: SimpleNamespace(returncode=0))
+    (tmp_path / "results/study/notch/notch.png").unlink()
+    with pytest.raises(OutputError, match=r"step notch has not made .*notch\.png"):
+        everything.main(only=("notch",))
+
+
+@pytest.mark.parametrize("step", everything.STEPS.values(), ids=lambda step: step.name)
+def test_the_steps_of_everything_are_there(step: Any) -> None:
+    """Fails if a script or module of a step is gone, or a page does not have what it copies."""
+    if step.arguments[0] == "-m":
+        assert importlib.util.find_spec(step.arguments[1]) is not None
+    else:
+        assert (FIGURES.parent / step.arguments[0]).is_file()
+    assert all((FIGURES.parent / place).parent.is_dir() for place in step.copies.values())
 
 
 # --- the spread ---

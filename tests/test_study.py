@@ -23,6 +23,7 @@ from skfsink.study.meshes import load_plate
 from skfsink.study.pareto import pareto_front
 from skfsink.study.part import Part, Planned
 from skfsink.study.plate import SLAB, Front, Plate, first_passages
+from skfsink.study.raised import RAISED
 from skfsink.study.rates import extrapolated, observed_rate
 from skfsink.study.refinement import plate
 from skfsink.study.speed_accuracy import PARTS, run_parts, speed_accuracy
@@ -333,6 +334,17 @@ def test_documented_figures_are_those_of_the_file(tmp_path: Path):
         if name in ("space", "tolerance", "raised"):  # the others take long
             part.draw(points, tmp_path / f"{name}.png")
             assert (tmp_path / f"{name}.png").stat().st_size > 1e5
+
+
+def test_runs_with_and_without_raised_mass_solve_for_gamma_as_often() -> None:
+    """Fails if the reference, whose steps are a tenth as long, solves ten times as often: that alone moves a crack."""
+    stored = json.loads((Path(__file__).parents[1] / "docs" / "images" / "speed_accuracy_raised.json").read_text())
+    apart = {key: p["gamma_every"] * (p["start"] + p["transit"]) / p["steps"] for key, p in stored["points"].items()}
+    ringed = [value for key, value in apart.items() if "no rings" not in key]
+    assert 0.05 < min(ringed) < max(ringed) < 0.13  # microseconds
+    (planned,) = (p for p in RAISED.plan(True) if p.key.startswith("0.001/"))
+    found = planned.compute()
+    assert 0.09 < found["gamma_every"] * (found["start"] + found["transit"]) / found["steps"] < 0.13
 
 
 def test_strong_laws_stand_beside_their_reference() -> None:

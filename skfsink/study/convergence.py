@@ -24,6 +24,7 @@ from typing import Annotated, Any
 
 import numpy as np
 from cyclopts import Parameter
+from matplotlib.collections import PolyCollection
 
 from ..meshing.shapes import single_edge_notch_mesh
 from ..meshing.vtu import write_mesh
@@ -35,7 +36,7 @@ from ..scene.options import Options
 from .chart import page
 from .ladder import scene_of
 from .part import Part, Planned, Points
-from .rates import extrapolated
+from .rates import RATES, extrapolated
 from .speed_accuracy import run_parts
 from .store import Store
 
@@ -43,10 +44,12 @@ __all__ = ["EVENT", "LAYERS", "Event", "convergence"]
 
 L = 0.1  # length scale of the sink [mm]
 SIZES, SEEDS = (3, 4, 5, 6, 8, 12), range(5)  # elements in l
+FAR = 0.1  # of the finest mean, that an extrapolated value may be away from it
+DRAWN = 0  # seed of the meshes whose cracks are drawn
 HALF_HEIGHT = 0.8  # of the fine elements ahead of the notch [mm]
 #: what is compared, as it is called, and with how many digits
-QUANTITIES = {"onset_displacement": ("onset: displacement of a grip (mm)", 4), "D": ("$D$ at the arrival (N mm/mm)", 4),
-              "D_per_length": ("$D$ over the length of the crack (N/mm)", 4), "tip_speed": ("mean tip speed (m/s)", 1),
+QUANTITIES = {"onset_displacement": ("displacement at the onset (mm)", 5), "D": ("$D$ at the arrival (N mm/mm)", 4),
+              "D_per_length": ("$D$ per crack length (N/mm)", 4), "tip_speed": ("mean tip speed (m/s)", 1),
               "first_branch": ("$x$ of the first branch (mm)", 2), "U": ("$U$ at the arrival (N mm/mm)", 4)}
 FLAG = Parameter(negative="", show_default=False)
 
@@ -56,6 +59,8 @@ def run_event(case: str, mesh: str, **dimensions: Any) -> dict[str, Any]:
 
     `crack_length` [mm] is that of all branches up to the first arrival: squares of side l that the crack goes through,
     times l. `first_branch` [mm] is where the leading tip is when a second branch appears, None if there is none.
+    `cracked` has the middle and the side of a square of equal area [mm] of each element that failed up to there, of a
+    plane body.
     """
     scene, _ = scene_of(case, Options(frame_every=5e-5), mesh, **dimensions)
     with tempfile.TemporaryDirectory() as folder, Display(quiet=True) as display:
@@ -64,10 +69,14 @@ def run_event(case: str, mesh: str, **dimensions: Any) -> dict[str, Any]:
         rows = History.load(Path(folder) / "history.csv")
     tracker, quantities = simulation.crack.tracker, measured(scene, simulation)
     length = L * len(crack_cells(scene, state, tracker.arrival))
+    space = scene.sample.space
+    failed = [e for time, e in state.deletions if tracker.arrival is None or time <= tracker.arrival]
+    middles = space.X[space.conn[failed]].mean(axis=1)
     branched = np.flatnonzero((rows["branches"] > 1) & (rows["phase"] == "event"))
     D = quantities["D"]
     return {**quantities, "crack_length": length, "D_per_length": D / length if D and length else None,
             "first_branch": float(rows["tip_x_mm"][branched[0]]) if len(branched) else None,
+            "cracked": np.column_stack([middles, np.sqrt(space.V[failed])]).round(4) if space.dim == 2 else [],
             "branches": tracker.max_branches, "elements": scene.sample.space.n_elements,
             "steps": simulation.cost()["steps"]}
 
@@ -89,7 +98,8 @@ class Event:
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "plate.vtu"
             write_mesh(path, single_edge_notch_mesh(h=L / self.per_length, half_height=HALF_HEIGHT, seed=self.seed))
-            return run_event("single_edge_notch", str(path))
+            found = run_event("single_edge_notch", str(path))
+        return found if self.seed == DRAWN else {name: value for name, value in found.items() if name != "cracked"}
 
 
 def plan(quick: bool) -> list[Planned]:
@@ -121,9 +131,17 @@ def numbers(group: Sequence[dict[str, Any]], quantity: str) -> np.ndarray:
 
 
 def limit(groups: dict[int, list[dict[str, Any]]], quantity: str) -> tuple[float, float] | None:
-    """Extrapolated mean of a quantity and its observed rate; None with fewer than three sizes."""
-    known = {n: values.mean() for n, group in groups.items() if len(values := numbers(group, quantity))}
-    return extrapolated([L / n for n in known], list(known.values())) if len(known) > 2 else None
+    """Extrapolated mean of a quantity and its observed rate; None with fewer than three sizes.
+
+    None as well if the means do not converge in the range of sizes: if no rate between those tried fits best, or the
+    extrapolated value is farther than `FAR` from the finest mean.
+    """
+    known = {n: float(values.mean()) for n, group in groups.items() if len(values := numbers(group, quantity))}
+    if len(known) < 3:
+        return None
+    value, rate = extrapolated([L / n for n in known], list(known.values()))
+    far = abs(value / known[max(known)] - 1) > FAR
+    return None if far or rate in (RATES[0], RATES[-1]) else (value, rate)
 
 
 def draw(points: Points, path: Path) -> None:
@@ -140,20 +158,41 @@ def draw(points: Points, path: Path) -> None:
                             color="k", ms=3.5, capsize=3, linewidth=1)
             if (found := limit(groups, quantity)) is not None:
                 ax.axhline(found[0], color="#33658a", linestyle="--", linewidth=0.8)
-            high = ax.get_ylim()[1]
+            low, high = ax.get_ylim()
             ax.set(xlabel="element size over $l$", ylabel=label, xlim=(0, None))
-            if quantity != "onset_displacement":
+            if quantity == "onset_displacement":
+                ax.set_ylim(0.99 * low, 1.01 * high)
+            else:
                 ax.set_ylim(0, 1.05 * high)
+    draw_cracks(groups, path.with_stem(f"{path.stem}_cracks"))
+
+
+def draw_cracks(groups: dict[int, list[dict[str, Any]]], path: Path) -> None:
+    """The elements that had failed at the arrival, on one mesh of each size, in the undeformed plate."""
+    drawn = {n: points[0]["cracked"] for n, points in groups.items() if "cracked" in points[0]}
+    if not drawn:
+        return
+    with page(path, "Elements that have failed when the crack arrives, on one mesh of each size", 2,
+              -(-len(drawn) // 2), 4.6) as axes:
+        for ax in axes[len(drawn):]:
+            ax.set_axis_off()
+        for ax, (n, cracked) in zip(axes, drawn.items()):
+            middles, side = np.split(np.array(cracked, float).reshape(-1, 3), [2], axis=1)
+            corners = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)])
+            ax.add_collection(PolyCollection(middles[:, None] + side[:, None] * corners, facecolor="k"))
+            ax.set(xlim=(0.9, 4.0), ylim=(0.9, 3.1), aspect="equal", title=f"$l/{n}$", xlabel="$x$ (mm)",
+                   ylabel="$y$ (mm)")
 
 
 def draw_layers(points: Points, path: Path) -> None:
     """Each quantity of the dog-bone over the number of layers, over its value with the most."""
     with page(path, "Dog-bone, layers over the thickness", 1, 1, 2.8, 3.4) as (ax,):
-        for quantity in ("onset_displacement", "U", "D", "tip_speed"):
+        for quantity, label in (("onset_displacement", "displacement at the onset"), ("U", "$U$"), ("D", "$D$"),
+                                ("tip_speed", "mean tip speed")):
             known = {int(n): p[quantity] for n, p in points.items() if p.get(quantity)}
             if known:
-                ax.plot(list(known), np.array(list(known.values())) / known[max(known)], "o-", ms=3, label=quantity)
-        ax.set(xlabel="layers", ylabel="over the value with the most layers", ylim=(0, None), xticks=[2, 3, 4])
+                ax.plot(list(known), np.array(list(known.values())) / known[max(known)], "o-", ms=3, label=label)
+        ax.set(xlabel="layers", ylabel="over the value with the most layers", ylim=(0.8, 1.2), xticks=[2, 3, 4])
         if points:
             ax.legend(fontsize=6)
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-__all__ = ["extrapolated", "observed_rate"]
+__all__ = ["RATES", "extrapolated", "observed_rate"]
 
 RATES = np.linspace(0.4, 4.0, 181)  # that are tried
 
