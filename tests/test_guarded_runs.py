@@ -21,6 +21,7 @@ from skfsink.methods.step_length import StepLength
 from skfsink.run.display import Display
 from skfsink.run.simulate import Loaded, Simulation
 from skfsink.run.summarize import summarize
+from skfsink.run.verdict import verdict
 from skfsink.study.plate import Plate
 
 
@@ -83,6 +84,33 @@ def test_unconverged_pass_is_not_followed(monkeypatch: pytest.MonkeyPatch):
         next(statics.propagate(state))
     for name in ("u", "gamma", "W_max", "deleted"):
         np.testing.assert_array_equal(getattr(state, name), getattr(before, name))
+
+
+@pytest.mark.parametrize("arrived", [True, False])
+def test_a_crack_that_has_arrived_ends_without_an_equilibrium(arrived: bool, tmp_path: Path,
+                                                              monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fails if an analysis is lost whose crack has crossed the body, or goes on where one has not."""
+    sim = event(tmp_path, analysis="quasistatic")
+    equilibrium, tracker = sim.statics.newton.equilibrium, sim.crack.tracker
+
+    def none(*arguments: Any, **options: Any) -> Any:
+        far = tracker.arrival is not None if arrived else np.isfinite(tracker.cracked_at).any()
+        if sim.state.phase == "event" and far:
+            raise ConvergenceError("no equilibrium within 400 Newton steps")
+        return equilibrium(*arguments, **options)
+
+    monkeypatch.setattr(sim.statics.newton, "equilibrium", none)
+    monkeypatch.setattr(tracker, "_apart", lambda _: False)  # the small block comes apart where its crack arrives
+    if not arrived:
+        with pytest.raises(ConvergenceError, match="no equilibrium within 400 Newton steps; the history follows"):
+            sim.run()
+        return
+    state = sim.run()
+    assert tracker.arrival == state.step and state.phase == "done"
+    assert re.search(rf"^arrested at .* after it had arrived in pass {state.step}: pass {state.step + 1}: "
+                     "no equilibrium within 400 Newton steps$", verdict(sim.scene, sim))
+    assert abs(state.ledger.balance) < 1e-6 * state.ledger.initial
+    assert summarize(sim.scene, sim)["energy"]["U_paper_at_arrival"] > 0
 
 
 @pytest.mark.parametrize(("most", "refused", "early", "message"), [

@@ -99,9 +99,10 @@ def test_explicit_and_hht_agree_before_branching(light: Result, hht: Result) -> 
     taken = [at(rows, rows["sink_stored"] + rows["sink_kinetic"]) for rows in (explicit, implicit)]
     apart = np.abs(tips[0] - tips[1])  # a tip jumps by an element where one fails
     assert apart.max() < 1.5 * ELEMENT and apart.mean() < 0.75 * ELEMENT
-    # D climbs in steps, one a failing element: each is 5 to 8 % of D here, and falls a microsecond apart in the two
+    # D climbs in steps, one a failing element: each is 5 to 8 % of D here, and falls a microsecond apart in the two, so
+    # that they differ by one step at the most, beside the 2 % that the times between solves for gamma make
     difference = np.abs(taken[0] / taken[1] - 1)[times > 30e-6]
-    assert difference.mean() < 0.05 and difference.max() < 0.08
+    assert difference.mean() < 0.05 and difference.max() < 0.1
 
 
 @pytest.mark.slow

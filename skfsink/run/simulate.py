@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import CheckpointError, Interrupted
+from ..errors import CheckpointError, ConvergenceError, Interrupted
 from ..fem.direct import one_thread_of_openblas
 from ..fields.body import Body
 from ..fields.state import State
@@ -212,15 +212,21 @@ class Simulation:
         self.observers.finish(view.at(state, integrator.reaction, "end", dt=integrator.dt))
 
     def _propagate(self) -> None:
-        state, view = self.state, self.view
+        state, view, tracker = self.state, self.view, self.crack.tracker
         spent = self.SPENT * self.onset.figures["elastic_energy"]
-        for _ in self.statics.propagate(state):
-            self.costs.steps += 1
-            self.observers.step(view.at(state, self.momentum.force(state.u), "step"))
-            at_rest = self.statics.settled or state.ledger.elastic < spent
-            if self.dissolved or (self.crack.tracker.separated and at_rest):
-                break
-            self.observers.pause(view)
+        try:
+            for _ in self.statics.propagate(state):
+                self.costs.steps += 1
+                self.observers.step(view.at(state, self.momentum.force(state.u), "step"))
+                at_rest = self.statics.settled or state.ledger.elastic < spent
+                if self.dissolved or (tracker.separated and at_rest):
+                    break
+                self.observers.pause(view)
+        except ConvergenceError as error:
+            if tracker.arrival is None or self.momentum.dead is not None:
+                raise
+            self.statics.arrested = str(error).partition(";")[0]
+            self.body.take(state)  # as the last pass has left it
         self.observers.finish(view.at(state, self.momentum.force(state.u), "end"))
 
     # --- costs and checkpoints ---

@@ -41,11 +41,11 @@ def verdict(scene: Scene, simulation: Simulation) -> str:
         return f"cracked and separated{first}; apart {_when(scene, simulation.crack.separated_at)}"
     last = simulation.history.rows[-1]
     tip = f"{place_text(last[f'tip_{x}_mm'] for x in 'xyz'[:scene.sample.space.dim])} mm"
+    arrived = "" if tracker.arrival is None else f" after it had arrived {_when(scene, tracker.arrival)}"
     if quasistatic and simulation.statics.arrested:
-        return f"arrested at {tip}: {simulation.statics.arrested}"
+        return f"arrested at {tip}{arrived}: {simulation.statics.arrested}"
     if last["tips"]:
         return f"the crack was still running at event_time = {event:g} s: its tip is at {tip}"
-    arrived = "" if tracker.arrival is None else f" after it had arrived {_when(scene, tracker.arrival)}"
     return f"arrested at {tip}{arrived}: no tip has moved for 5 l/c_s at the end of the event"
 
 
