@@ -2,7 +2,7 @@
 
 The steps are commands that are documented where their results are; each goes on where it was stopped, so that this
 command does too, and a step that is finished takes seconds. What they leave below `results` is then copied to where
-the documentation has it. It needs the extras `mesh` and `docs`.
+the documentation has it. It needs the extras `mesh` and `view`.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import paper
-from layout import BLUE, RED, WIDTH, save, script
+from layout import BLUE, RED, WIDTH, legend, save, script
 from matplotlib.figure import Figure
 from runs import FRONTS, OVERDAMPED
 from spread import Row, rows_of, values
@@ -47,8 +47,7 @@ def draw(path: Path) -> None:
         ax.set_title(f"({letter}) {paper.SHORT[case].replace(chr(10), ' ')}", loc="left")
         ax.set_xlabel("front")
     axes[0].set_ylabel("over the value at the last front")
-    handles = {label: handle for ax in axes for handle, label in zip(*ax.get_legend_handles_labels())}
-    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=3)
+    legend(figure, 3)
     save(figure, path)
 
 

@@ -22,8 +22,8 @@ from skfsink.pictures import plot
 from skfsink.results.reference import Reference
 from skfsink.system.files import write_atomic
 
-__all__ = ["ANALYSES", "BLUE", "DPI", "RED", "WIDTH", "Panel", "densities", "dissipation", "microseconds", "save",
-           "script", "start", "title"]
+__all__ = ["ANALYSES", "BLUE", "DPI", "RED", "WIDTH", "Panel", "densities", "dissipation", "legend", "microseconds",
+           "save", "script", "start", "title"]
 
 WIDTH, DPI = plot.WIDTH, plot.DPI
 LARGEST = 950_000  # of a file [bytes]
@@ -67,6 +67,12 @@ def dissipation(ax: Axes, dynamic: Reference, quasistatic: Reference, printed: d
            box_aspect=1)
     ax.set_ylim(0, 1.45 * ax.get_ylim()[1])  # room for the legend
     ax.legend(loc="upper left")
+
+
+def legend(figure: Figure, columns: int) -> None:
+    """One legend below all axes, with each label once."""
+    handles = {label: handle for ax in figure.axes for handle, label in zip(*ax.get_legend_handles_labels())}
+    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=columns)
 
 
 def save(figure: Figure, path: Path) -> None:

@@ -20,7 +20,7 @@ import numpy as np
 import paper
 from compute import ROOT, finish, in_parallel
 from cyclopts import App, Parameter
-from layout import ANALYSES, WIDTH, save, start
+from layout import ANALYSES, WIDTH, legend, save, start
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
@@ -204,8 +204,7 @@ def draw(path: Path) -> None:
     for ax, text in zip(axes[:, 0], ("$U$ at arrival (N mm/mm)", "$D$ at arrival (N mm/mm)",
                                      "dynamic over\nquasi-static")):
         ax.set_ylabel(text)
-    handles = {label: handle for ax in axes.flat for handle, label in zip(*ax.get_legend_handles_labels())}
-    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=3)
+    legend(figure, 3)
     save(figure, path)
 
 

@@ -32,8 +32,9 @@ def hht(tmp_path_factory: pytest.TempPathFactory) -> Result:
 
 @pytest.fixture(scope="module")
 def light(tmp_path_factory: pytest.TempPathFactory) -> Result:
-    """The same by the explicit scheme without raised mass, which HHT does not have, as 23,000 steps."""
-    options = Options(raised_mass=0.0, event_time=5.2e-5, quiet=True, out=tmp_path_factory.mktemp("runs") / "light")
+    """The same by the explicit scheme, in 41,000 steps: without raised mass, gamma in every step, as HHT has it."""
+    options = Options(raised_mass=0.0, gamma_every=1, event_time=5.2e-5, quiet=True,
+                      out=tmp_path_factory.mktemp("runs") / "light")
     return single_edge_notch(mesh="coarse", options=options)
 
 
@@ -98,11 +99,10 @@ def test_explicit_and_hht_agree_before_branching(light: Result, hht: Result) -> 
     tips = [at(rows, rows["crack_length_mm"]) for rows in (explicit, implicit)]
     taken = [at(rows, rows["sink_stored"] + rows["sink_kinetic"]) for rows in (explicit, implicit)]
     apart = np.abs(tips[0] - tips[1])  # a tip jumps by an element where one fails
-    assert apart.max() < 1.5 * ELEMENT and apart.mean() < 0.75 * ELEMENT
-    # D climbs in steps, one a failing element: each is 5 to 8 % of D here, and falls a microsecond apart in the two, so
-    # that they differ by one step at the most, beside the 2 % that the times between solves for gamma make
+    assert apart.max() < 1.2 * ELEMENT and apart.mean() < 0.6 * ELEMENT
+    # D climbs in steps, one a failing element: each is 5 to 8 % of D here, and falls a microsecond apart in the two
     difference = np.abs(taken[0] / taken[1] - 1)[times > 30e-6]
-    assert difference.mean() < 0.05 and difference.max() < 0.1
+    assert difference.mean() < 0.05 and difference.max() < 0.08
 
 
 @pytest.mark.slow

@@ -11,7 +11,7 @@ from ..fields.state import State
 from ..scene.scene import Scene
 from .simulate import Simulation
 
-__all__ = ["PATH", "crack_cells", "measured", "relative_error"]
+__all__ = ["PATH", "crack_cells", "failed_until", "measured", "relative_error"]
 
 PATH = "crack_path"
 NEAR = 1.5  # lengths l between cells of two cracks that are the same
@@ -35,14 +35,18 @@ def measured(scene: Scene, simulation: Simulation) -> dict[str, float | None]:
             "tip_speed": tracker.mean_speed() if dynamic and arrival else None}
 
 
+def failed_until(state: State, until: float | None) -> list[int]:
+    """Elements that had failed at a time (quasi-static: a pass), in the order in which they did; None takes all."""
+    return [element for time, element in state.deletions if until is None or time <= until]
+
+
 def crack_cells(scene: Scene, state: State, until: float | None) -> list[list[int]]:
     """The crack at the first arrival: squares of side l of the section in which elements had failed, ascending.
 
     `until` is the time (quasi-static: pass) of the arrival; None takes all.
     """
     space = scene.sample.space
-    failed = [element for time, element in state.deletions if until is None or time <= until]
-    middle = space.X[space.conn[failed]].mean(axis=1).reshape(-1, space.dim)
+    middle = space.X[space.conn[failed_until(state, until)]].mean(axis=1).reshape(-1, space.dim)
     cells = np.floor(scene.whole.places(scene.flat(middle)) / scene.sink_law.length_scale).astype(int)
     found: list[list[int]] = np.unique(cells, axis=0).tolist()
     return found

@@ -30,7 +30,7 @@ from ..meshing.shapes import single_edge_notch_mesh
 from ..meshing.vtu import write_mesh
 from ..results.history import History
 from ..run.display import Display
-from ..run.quantities import crack_cells, measured
+from ..run.quantities import crack_cells, failed_until, measured
 from ..run.simulate import Simulation
 from ..scene.options import Options
 from .chart import page
@@ -69,15 +69,14 @@ def run_event(case: str, mesh: str, **dimensions: Any) -> dict[str, Any]:
         rows = History.load(Path(folder) / "history.csv")
     tracker, quantities = simulation.crack.tracker, measured(scene, simulation)
     length = L * len(crack_cells(scene, state, tracker.arrival))
-    space = scene.sample.space
-    failed = [e for time, e in state.deletions if tracker.arrival is None or time <= tracker.arrival]
+    space, failed = scene.sample.space, failed_until(state, tracker.arrival)
     middles = space.X[space.conn[failed]].mean(axis=1)
     branched = np.flatnonzero((rows["branches"] > 1) & (rows["phase"] == "event"))
     D = quantities["D"]
     return {**quantities, "crack_length": length, "D_per_length": D / length if D and length else None,
             "first_branch": float(rows["tip_x_mm"][branched[0]]) if len(branched) else None,
             "cracked": np.column_stack([middles, np.sqrt(space.V[failed])]).round(4) if space.dim == 2 else [],
-            "branches": tracker.max_branches, "elements": scene.sample.space.n_elements,
+            "branches": tracker.max_branches, "elements": space.n_elements,
             "steps": simulation.cost()["steps"]}
 
 
@@ -99,7 +98,9 @@ class Event:
             path = Path(folder) / "plate.vtu"
             write_mesh(path, single_edge_notch_mesh(h=L / self.per_length, half_height=HALF_HEIGHT, seed=self.seed))
             found = run_event("single_edge_notch", str(path))
-        return found if self.seed == DRAWN else {name: value for name, value in found.items() if name != "cracked"}
+        if self.seed != DRAWN:
+            del found["cracked"]
+        return found
 
 
 def plan(quick: bool) -> list[Planned]:
