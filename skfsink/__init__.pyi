@@ -2,6 +2,8 @@ from .cases.custom import custom as custom
 from .loads.grips import Grip as Grip
 from .loads.grips import Ramp as Ramp
 from .loads.grips import Traction as Traction
+from .loads.pressure import Filling as Filling
+from .loads.pressure import Pressure as Pressure
 from .material.homogeneous import peaks as peaks
 from .material.library import material_from as material_from
 from .material.regions import RegionLaw as RegionLaw

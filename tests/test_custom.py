@@ -225,7 +225,7 @@ def test_tables_keep_what_they_say(tmp_path: Path) -> None:
     assert read_tables("tractions", [{"boundary": "a", "y": "10 kPa/s"}]) == ({"boundary": "a", "y": 0.01},)
     region = {"name": "core", "material": "gent", "constants": "mu = 1 MPa", "phi": "500 kPa", "density": "1 g/cm^3"}
     assert read_tables("regions", [region]) == (region | {"phi": 0.5, "density": 1000.0},)
-    parameters = {"mesh": "a.vtu", "grips": grips, "tractions": (), "regions": ()}
+    parameters = {"mesh": "a.vtu", "grips": grips, "tractions": (), "pressures": (), "fillings": (), "regions": ()}
     StoredScene("custom", parameters).write(tmp_path)
     assert StoredScene.read(tmp_path) == StoredScene("custom", {**parameters, "grips": list(grips)})
 
@@ -265,7 +265,8 @@ def test_only_custom_scenes_have_tables(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("changed", "said"), [
-    ({"mesh": "coarse"}, "mesh must be the path of a mesh file"), ({"grips": ()}, "at least one grip or traction"),
+    ({"mesh": "coarse"}, "mesh must be the path of a mesh file"),
+    ({"grips": ()}, "at least one grip, traction or pressure"),
     ({"speed": 1.0}, "speed is for the cases"), ({"half": True}, "half is for the cases"),
     ({"model": "auto"}, "model is for the cases"),
     ({"faces": "nope"}, "faces: 'nope' is no boundary of mesh plate, which has bottom, left, notch, right, top;"),

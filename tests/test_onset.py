@@ -67,7 +67,7 @@ class Loaded:
         self.state, gauge, self.way, self.strain = State.intact(space), Gauge(scene, loading), [], []
         for _ in self.statics.load(self.state):
             force = self.momentum.force(self.state.u)
-            self.way.append((gauge.displacement(self.state), gauge.load(force)))
+            self.way.append((gauge.displacement(self.state), gauge.load(force, self.state.u)))
             self.strain.append((mean_deformation(self.momentum, self.state.u), mean_stress(space, force)))
         self.loads = np.array(self.way)[:, 1]
 

@@ -91,13 +91,14 @@ def test_each_column_says_its_unit_and_old_files_are_read(tmp_path: Path, dim: i
     history = History(tmp_path / "history.csv", made, dim)
     header = history.path.read_text().splitlines()[0].split(",")
     plain = {"phase", "step", "tips", "branches", "deleted_elements", "gamma_min"}
-    assert [name for name in header if not name.endswith(("_s", "_mm", force, energy)) and name not in plain] == []
+    units = ("_s", "_mm", "_MPa", f"_mm{dim}", force, energy)
+    assert [name for name in header if not name.endswith(units) and name not in plain] == []
     loaded = History.load(history.path)
     assert load_name(dim) == f"reaction_{force}" in history_header(dim)
     assert onset_load({load_name(dim): 2.0}) == onset_load({"reaction_N_per_mm": 2.0}) == 2.0
     assert loaded.dim == dim and loaded[f"reaction_{force}"] is loaded["reaction_N_per_mm"]
     assert {name.replace(" ", "_").replace("/", "_per_") for name in loaded.units.values()} == {
-        "", "1", "s", "mm", "m_per_s", force, energy}
+        "", "1", "s", "mm", "m_per_s", "MPa", f"mm^{dim}", force, energy}
     with pytest.raises(KeyError):
         loaded["nothing"]
     old = history.path.read_text().replace(",".join(header), ",".join(HISTORY_COLUMNS), 1)

@@ -90,11 +90,14 @@ def test_every_deck_beside_them_can_be_read() -> None:
 def test_the_deck_of_the_page_can_be_read(tmp_path: Path) -> None:
     """Fails if the deck that docs/decks.md explains has a table, a parameter or a unit that cannot be."""
     page = (data_folder("pure_shear").parents[1] / "docs" / "decks.md").read_text(encoding="utf-8")
-    (text,) = re.findall(r"(?s)```toml\n(.*?)```", page)
+    text, loads = re.findall(r"(?s)```toml\n(.*?)```", page)
     (tmp_path / "deck.toml").write_text(text, encoding="utf-8")
     own, options = read_deck(tmp_path / "deck.toml").check()
     assert len(own["grips"]) == 2 and own["tractions"][0]["x"] == [[0.0, 0.0], [10.0, 0.02]]
     assert own["regions"][0]["phi"] == 2.0 and options.element == "planestress"
+    (tmp_path / "deck.toml").write_text('case = "custom"\n' + loads, encoding="utf-8")
+    own, _ = read_deck(tmp_path / "deck.toml").check()
+    assert own["pressures"][0]["value"] == [[0.0, 0.0], [1.0, 0.016]] and own["fillings"][0]["compliance"] == 10.0
 
 
 def test_a_name_stands_for_a_deck(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

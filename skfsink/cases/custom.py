@@ -10,6 +10,7 @@ from cyclopts import Parameter
 
 from ..errors import ParameterError
 from ..loads.grips import Grip, Traction
+from ..loads.pressure import Filling, Pressure
 from ..material.regions import Region, RegionLaw
 from ..meshing.sample import file_sample
 from ..results.result import Result
@@ -18,7 +19,7 @@ from ..run.request import check_options
 from ..scene.case import Case
 from ..scene.options import SAMPLE, Options
 from ..scene.scene import Scene
-from ..scene.tables import grips_of, read_tables, regions_of, tractions_of
+from ..scene.tables import grips_of, pressures_of, read_tables, regions_of, tractions_of
 from ..units import Unit
 
 __all__ = ["custom"]
@@ -34,6 +35,8 @@ def custom(
         merge_nodes: Annotated[float, SAMPLE, Unit("mm")] = 0.0,
         grips: Annotated[Sequence[Grip | Mapping[str, Any]], IN_A_DECK] = (),
         tractions: Annotated[Sequence[Traction | Mapping[str, Any]], IN_A_DECK] = (),
+        pressures: Annotated[Sequence[Pressure | Mapping[str, Any]], IN_A_DECK] = (),
+        fillings: Annotated[Sequence[Filling | Mapping[str, Any]], IN_A_DECK] = (),
         regions: Annotated[Sequence[RegionLaw | Mapping[str, Any]], IN_A_DECK] = (),
         options: Options = Options(),  # noqa: B008
 ) -> Result:
@@ -59,6 +62,12 @@ def custom(
         component left out is free. The load is the force on the first one that moves.
     tractions
         Dead loads on boundaries, per undeformed area: for x, y, z a rate, or a ramp of points [time, traction].
+    pressures
+        Pressures on boundaries, which follow the deformed surface: a value, which is reached in the first second of
+        load time, or a ramp of points [time, pressure]; or a rate. With `in_crack` they act in cracks from it as well.
+    fillings
+        Cavities into which a fluid is pumped: inflow, or a ramp of points [time, volume], and compliance, volume by
+        pressure, of fluid and pump. A plane body counts as 1 mm thick.
     regions
         Named sets of elements that are of another material, or of another strength.
     options
@@ -76,6 +85,7 @@ def custom(
                              f"{faces!r:.80}")
     arguments = {"mesh": mesh, "title": title, "faces": faces, "merge_nodes": merge_nodes,
                  "grips": read_tables("grips", grips), "tractions": read_tables("tractions", tractions),
+                 "pressures": read_tables("pressures", pressures), "fillings": read_tables("fillings", fillings),
                  "regions": read_tables("regions", regions)}
     return run_case(CASE, arguments, options)
 
@@ -83,8 +93,10 @@ def custom(
 def _scene(arguments: dict[str, Any], options: Options) -> Scene:
     if not Path(arguments["mesh"]).suffix:
         raise ParameterError(f"mesh must be the path of a mesh file; got {arguments['mesh']!r}")
-    if not arguments["grips"] and not arguments["tractions"]:
-        raise ParameterError("grips: a scene needs at least one grip or traction; a deck has them as [[grips]]")
+    pressures = pressures_of(arguments.get("pressures", ()), arguments.get("fillings", ()))
+    if not arguments["grips"] and not arguments["tractions"] and not pressures:
+        raise ParameterError("grips: a scene needs at least one grip, traction or pressure; a deck has them as "
+                             "[[grips]]")
     if options.speed != Options.speed:
         raise ParameterError(f"speed is for the cases of the paper; a grip of a custom scene has its own velocity; "
                              f"got {options.speed:g}")
@@ -100,7 +112,7 @@ def _scene(arguments: dict[str, Any], options: Options) -> Scene:
         case="custom", title=arguments["title"], parameters={**arguments, **options.parameters()}, sample=sample,
         material=material, sink_law=sink_law, controls=options.controls(), regions=regions,
         grips=grips_of(arguments["grips"], dim),
-        tractions=tractions_of(arguments["tractions"], dim),
+        tractions=tractions_of(arguments["tractions"], dim), pressures=pressures,
         faces=tuple(filter(None, (name.strip() for name in arguments["faces"].split(",")))))
 
 

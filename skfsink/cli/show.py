@@ -15,6 +15,10 @@ EXAMPLES = {
               'y = "1e-3 mm/s"', '[[grips]]', 'boundary = "right"',
               'x = [["0 s", "0 mm"], ["10 s", "0.5 mm"]]     # then it stays'),
     "tractions": ('[[tractions]]', 'boundary = "left"', 'x = "-1 kPa/s"'),
+    "pressures": ('[[pressures]]', 'boundary = "inner"', 'value = "16 kPa"        # or a ramp; or rate = "1 kPa/s"',
+                  'in_crack = true         # in cracks that come from it as well'),
+    "fillings": ('[[fillings]]', 'boundary = "inner"', 'inflow = "1 mm^3/s"     # or a ramp of the volume',
+                 'compliance = "0.1 mm^3/kPa"'),
     "regions": ('[[regions]]', 'name = "inclusion"', 'material = "neo-hookean"', 'constants = "mu = 2 MPa"',
                 'phi = "1 MPa"          # also m, bulk_modulus, density'),
 }

@@ -113,7 +113,7 @@ class Body:
     Raises
     ------
     ParameterError
-        The momentum balance has other dead loads than the loading.
+        The momentum balance has other loads than the loading.
     """
 
     momentum: Momentum
@@ -125,6 +125,9 @@ class Body:
     def __post_init__(self) -> None:
         if self.momentum.dead is not self.loading.dead:
             raise ParameterError("the momentum balance has other dead loads than the loading: give it `loading.dead`")
+        if self.momentum.followers is not self.loading.followers:
+            raise ParameterError("the momentum balance has other pressures than the loading: give it "
+                                 "`loading.followers`")
 
     @classmethod
     def of(cls, scene: BodyScene) -> Body:
@@ -132,7 +135,8 @@ class Body:
         controls, space, loading = scene.controls, scene.space, scene.loading()
         threads = controls.workers(space.dim)
         momentum = Momentum(space, scene.material, controls.element, controls.force_floor, threads,
-                            regions=scene.regions, dead=loading.dead, kernels=controls.kernels,
+                            regions=scene.regions, dead=loading.dead, followers=loading.followers,
+                            kernels=controls.kernels,
                             bulk_viscosity=BulkViscosity(controls.bulk_viscosity_linear,
                                                          controls.bulk_viscosity_quadratic))
         if controls.contact:

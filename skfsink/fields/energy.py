@@ -29,8 +29,8 @@ OPTIONAL_TERMS = ("contact", "viscous")
 class Ledger:
     """Energies [N mm; N mm/mm in 2D] since the start of the phase it belongs to.
 
-    Memory: all entries: `drop` books on, and `sink`, `balance`, `error` and `as_dict` sum up what has been booked so
-    far.
+    Memory: all entries: `drop` and `book_pressure` book on, and `sink`, `balance`, `error` and `as_dict` sum up what
+    has been booked so far.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class Ledger:
     loads: potential -f.u of the dead loads.
     contact: energy of the medium between the lips of cracks; see :mod:`.contact`.
     kinetic: gamma-weighted kinetic energy.
-    work: work of the grips, and -u.df of dead loads f that change.
+    work: work of the grips and of pressures, and -u.df of dead loads f that change.
     sink_stored, sink_kinetic: the two parts of D.
     deletion: stored energy of elements at the moment they were deleted, of debris the kinetic one too, and what contact
         loses as density falls.
@@ -47,6 +47,7 @@ class Ledger:
     released: energy a quasi-static analysis gives up in relaxing at fixed gamma; a dynamic one turns it into motion.
     viscous: work done against viscosity, never negative but for terms of second order in the step.
     paper: U of the paper.
+    pressure_work: the part of `work` that pressures did; no term of its own.
     debris: the part of `deletion` that was in debris; no term of its own.
     """
 
@@ -64,6 +65,7 @@ class Ledger:
     paper: float = 0.0
     contact: float = 0.0
     debris: float = 0.0
+    pressure_work: float = 0.0
 
     @property
     def sink(self) -> float:
@@ -88,6 +90,11 @@ class Ledger:
     def error(self, scale: float) -> float:
         """|balance| relative to `scale`, usually the elastic energy at onset; without one, to the :attr:`turnover`."""
         return abs(self.balance) / self.scale(scale)
+
+    def book_pressure(self, work: float) -> None:
+        """Book the work of pressures."""
+        self.work += work
+        self.pressure_work += work
 
     def drop(self, w: np.ndarray, W: np.ndarray, before: np.ndarray, after: np.ndarray) -> None:
         """Book the stored energy taken when the Gauss point densities fall from `before` to `after` at fixed W."""

@@ -12,6 +12,7 @@ from ..fem.backends import backend
 from ..fem.elements import check_element
 from ..fem.pattern import Pattern
 from ..fem.space import Space
+from ..loads.follower import FollowerLoads
 from ..loads.nodal import NodalLoads
 from ..material import GeneralMaterial, Material
 from ..material.regions import Region, by_element, rest_of
@@ -27,7 +28,8 @@ class Momentum:
     Memory: the density last given to `set_gamma` and the load time last given to `set_time`: `force`, `tangent`,
     `stiffest`, `viscous_force`, `viscous_tangent`, `lumped_mass` and `consistent_mass` are for these. `potential`, `W`,
     `energy` and `pressed` are of the last `force`, `compression` of the last `viscous_force`. `contact` is set once;
-    `book_contact`, `lips` and `memory` are of what it has seen, and `restore` takes up the last.
+    `book_contact` and `memory` are of what it has seen, and `restore` takes up the last. `pressure_work`,
+    `load_size` and `added_stiffness` are for the load time last given.
 
     Parameters
     ----------
@@ -39,6 +41,7 @@ class Momentum:
     regions: elements of other materials.
     kernels: what evaluates the weak forms, a name in :data:`.BACKENDS`.
     dead: dead loads, if there are any, at the load time last given to :meth:`set_time`; `force` is less them.
+    followers: pressures that follow the surface, in the same way.
     bulk_viscosity: coefficients of the bulk viscosity; the shear viscosity is that of the materials.
 
     Attributes
@@ -58,7 +61,8 @@ class Momentum:
 
     def __init__(self, space: Space, material: Material, element: str = "jbar", force_floor: float = 1e-3,
                  threads: int = 1, *, regions: Sequence[Region] = (), dead: NodalLoads | None = None,
-                 kernels: str = "compiled", bulk_viscosity: BulkViscosity = BulkViscosity()) -> None:  # noqa: B008
+                 followers: FollowerLoads | None = None, kernels: str = "compiled",
+                 bulk_viscosity: BulkViscosity = BulkViscosity()) -> None:  # noqa: B008
         self.plane_stress = check_element(element, space, kernels).thin_sheet
         self.space, self.material, self.element, self.force_floor = space, material, element, force_floor
         self.parts = self._divide(regions)
@@ -73,7 +77,10 @@ class Momentum:
         rho0 = by_element(space.n_elements, material.rho0, regions, lambda region: region.material.rho0)
         self.rho0 = rho0[:, None] if isinstance(rho0, np.ndarray) else rho0
         self.energy = self.loads = 0.0
-        self.dead = dead
+        self.dead, self.followers = dead, followers
+        if self.plane_stress and followers is not None:
+            raise ParameterError("element planestress has no thickness for a pressure on its edges to act on: take "
+                                 "jbar, or a dead traction")
         self.contact: Contact | None = None
         self.least_J = 1.0
         self.evaluations = 0
@@ -125,6 +132,8 @@ class Momentum:
         if self.dead is not None:
             nodes, e = self.space.conn[self.dead.elements], self.dead.elements
             self.dead.keep(((gamma[nodes] @ self.space.N.T >= self.force_floor) & ~deleted[e, None]).any(axis=1))
+        if self.followers is not None:
+            self.followers.keep(gamma, deleted, self.force_floor)
         taken = self.backend.relax(gamma, deleted, self.force_floor)
         if self.contact is not None:
             self._mass = self._lumped(self.gamma)
@@ -133,14 +142,35 @@ class Momentum:
         return taken
 
     def set_time(self, t: float) -> None:
-        """Use the dead loads of load time `t` [s] from now on."""
+        """Use the loads of load time `t` [s] from now on."""
         if self.dead is not None:
             self.dead.at(t)
+        if self.followers is not None:
+            self.followers.at(t)
 
     @property
     def potential(self) -> float:
-        """Stored energy, contact and potential of the dead loads at the last evaluation: `force` is its derivative."""
+        """Stored energy, contact and potential of the dead loads at the last evaluation.
+
+        `force` is its derivative, less the forces of pressures, which have no potential.
+        """
         return self.energy + self.loads + self.pressed
+
+    def pressure_work(self, u: np.ndarray, end: np.ndarray, before: np.ndarray | None = None,
+                      equilibria: bool = False) -> float:
+        """Work of the pressures on the straight way from `u` to `end` (n, dim) [N mm; N mm/mm in 2D].
+
+        They stand still in time, or go evenly from those `before`, :attr:`.FollowerLoads.values` then; see
+        :meth:`.FollowerLoads.work` for `equilibria`.
+        """
+        loads = self.followers
+        return 0.0 if loads is None else loads.work(loads.values if before is None else before, u, end,
+                                                          equilibria)
+
+    def load_size(self, u: np.ndarray) -> float:
+        """Norms of the nodal forces of dead loads and of pressures at `u`, added [N; N/mm in 2D]."""
+        dead = 0.0 if self.dead is None else float(np.linalg.norm(self.dead.values))
+        return dead if self.followers is None else dead + self.followers.size(u)
 
     @property
     def pressed(self) -> float:
@@ -152,21 +182,31 @@ class Momentum:
         if self.contact is not None:
             self.contact.book(ledger, u)
 
-    def lips(self, u: np.ndarray) -> np.ndarray | None:
-        """:meth:`.Contact.tangent` at the displacement `u` (n, dim), None where no lips press on each other."""
-        return None if self.contact is None else self.contact.tangent(u)
+    def added_stiffness(self, u: np.ndarray, free: np.ndarray) -> np.ndarray | None:
+        """Columns B over the unknowns that are `free` (n*dim,), of a stiffness B B^T beside :meth:`tangent`.
+
+        They are those of lips that press on each other (:meth:`.Contact.tangent`) and of fluids in cavities at the
+        displacement `u` (n, dim); None where there are none.
+        """
+        lips = None if self.contact is None else self.contact.tangent(u)
+        fluids = None if self.followers is None else self.followers.stiffening(u)
+        parts = [B for B in (lips, None if fluids is None else fluids[free]) if B is not None]
+        return np.hstack(parts) if len(parts) > 1 else parts[0] if parts else None
 
     def memory(self) -> dict[str, np.ndarray]:
-        """What contact remembers beyond density and load time, for a checkpoint."""
-        return {} if self.contact is None else {"contact_rest": self.contact.rest}
+        """What contact and pressures remember beyond density and load time, for a checkpoint."""
+        return {**({} if self.contact is None else {"contact_rest": self.contact.rest}),
+                **({} if self.followers is None else self.followers.memory())}
 
     def restore(self, memory: dict[str, np.ndarray]) -> None:
         """Take up what :meth:`memory` gave; evaluations after it are with it."""
         if self.contact is not None:
             self.contact.rest[...] = memory["contact_rest"]
+        if self.followers is not None:
+            self.followers.restore(memory)
 
     def force(self, u: np.ndarray, out: np.ndarray | None = None) -> np.ndarray:
-        """Internal force at the displacement `u` less the dead loads, (n, dim) [N; N/mm in 2D].
+        """Internal force at the displacement `u` less the loads, (n, dim) [N; N/mm in 2D].
 
         Sets `energy`, `loads`, `least_J` and `W`. With `contact`, nodes without mass are moved in `u` to where they
         follow the lips.
@@ -178,6 +218,8 @@ class Momentum:
         if self.dead is not None:
             out[self.dead.nodes] -= self.dead.values
             self.loads = self.dead.potential(u)
+        if self.followers is not None:
+            self.followers.add_force(u, out)
         if self.contact is not None:
             self.contact.add_force(placed, out)
         self.evaluations += 1
@@ -205,8 +247,14 @@ class Momentum:
         return self.backend.untile(self.backend.W)
 
     def tangent(self, pattern: Pattern, u: np.ndarray, convex: bool = False) -> np.ndarray:
-        """Data of the tangent stiffness at `u` on `pattern`; with `convex` one that is positive at every point."""
-        return self.backend.tangent(pattern, u, self.gamma, convex)
+        """Data of the tangent stiffness at `u` on `pattern`; with `convex` one that is positive at every point.
+
+        The stiffness of pressures, its symmetric part, is in it but where it is to be convex.
+        """
+        data = self.backend.tangent(pattern, u, self.gamma, convex)
+        if self.followers is not None and not convex:
+            self.followers.add_stiffness(pattern, u, data)
+        return data
 
     def stiffest(self, u: np.ndarray, inverse_mass: np.ndarray) -> float:
         """Cheap indicator of the highest frequency squared at `u`, and below it [1/s^2].

@@ -1,4 +1,4 @@
-"""How a body is loaded at each load time: what is held, how fast grips move, and the dead loads."""
+"""How a body is loaded at each load time: what is held, how fast grips move, dead loads and pressures."""
 
 from __future__ import annotations
 
@@ -10,8 +10,10 @@ import numpy as np
 from ..errors import ParameterError
 from ..fem.space import Space
 from .dead_load import DeadLoad
+from .follower import FollowerLoads
 from .grips import Grip, Ramp, Traction
 from .nodal import NodalLoads, Together
+from .pressure import Filling, Pressure
 
 __all__ = ["Loading"]
 
@@ -19,16 +21,17 @@ _AXES = "xyz"
 
 
 class Loading:
-    """Grips and tractions on a mesh.
+    """Grips, tractions and pressures on a mesh.
 
-    Between two *knots*, the times at which a ramp has a point, grips move at constant velocity and tractions change
-    at a constant rate.
+    Between two *knots*, the times at which a ramp has a point, grips move at constant velocity, and tractions and
+    pressures change at a constant rate.
 
     Parameters
     ----------
     space: the mesh.
     grips, tractions: each with the nodes of its boundary.
     others: loads of other kinds.
+    pressures: pressures and fillings, each with the nodes of its boundary.
 
     Attributes
     ----------
@@ -36,18 +39,20 @@ class Loading:
     knots: ascending, all > 0 [s].
     tractions: as forces at nodes, None if there are none.
     dead: all dead loads, None if there are none.
+    followers: the pressures, None if there are none.
 
     Raises
     ------
     ParameterError
         A grip or traction has not as many components as the mesh, two grips move a node differently, or a body under
-        tractions can move as a whole.
+        tractions or pressures can move as a whole.
     MeshError
-        The mesh has no facet a traction could act on.
+        The mesh has no facet a traction or pressure could act on.
     """
 
     def __init__(self, space: Space, grips: Sequence[tuple[np.ndarray, Grip]],
-                 tractions: Sequence[tuple[np.ndarray, Traction]] = (), others: Sequence[NodalLoads] = ()) -> None:
+                 tractions: Sequence[tuple[np.ndarray, Traction]] = (), others: Sequence[NodalLoads] = (),
+                 pressures: Sequence[tuple[np.ndarray, Pressure | Filling]] = ()) -> None:
         self._moves: list[tuple[np.ndarray, int, float | Ramp]] = []
         free = np.ones(space.X.shape, bool)
         holders = np.full(space.X.shape, -1)  # number of the grip that holds a component of a node
@@ -69,17 +74,21 @@ class Loading:
                     self._moves.append((nodes, i, value))
         self.free = free.ravel()
         values = [value for *_, value in self._moves] + [v for _, traction in tractions for v in traction.rate]
+        values += [load.rate if isinstance(load, Pressure) else load.inflow for _, load in pressures]
         ramps = [value for value in values if isinstance(value, Ramp)]
         self.knots: tuple[float, ...] = tuple(sorted({float(t) for ramp in ramps for t in ramp.times if t > 0}))
         self.tractions = DeadLoad(space, tractions) if tractions else None
         loads = [*([self.tractions] if self.tractions is not None else []), *others]
         self.dead: NodalLoads | None = Together(loads, space.n_nodes) if len(loads) > 1 else loads[0] if loads else None
+        self.followers = FollowerLoads(space, pressures) if pressures else None
         self._shape = space.X.shape
         self._steady: np.ndarray | None = None
         if not any(isinstance(value, Ramp) for *_, value in self._moves):
             self._steady = self.velocity(0.0)
-        if loads:
+        if loads or pressures:
             _check_held(space, free)
+        if self.followers is not None:
+            self.followers.check_closed(self.free)
 
     @classmethod
     def steady(cls, space: Space, free: np.ndarray, velocity: np.ndarray) -> Loading:
@@ -103,19 +112,28 @@ class Loading:
         return velocity
 
     def speed(self, t: float) -> float:
-        """Greatest component of that velocity [mm/s]."""
-        return float(np.abs(self.velocity(t)).max())
+        """Greatest component of that velocity, or mean motion of the boundary of a filling [mm/s]."""
+        speed = float(np.abs(self.velocity(t)).max())
+        return speed if self.followers is None else max(speed, self.followers.speed(t))
+
+    def rises_in_pressure(self, t: float) -> bool:
+        """Whether a given pressure changes from load time `t` on."""
+        return self.followers is not None and self.followers.rate(t) > 0.0
+
+    def greatest_pressure(self, u: np.ndarray) -> float:
+        """Greatest pressure at the displacement `u` (n, dim), by its amount [MPa]; 0 without any."""
+        return 0.0 if self.followers is None else float(np.abs(self.followers.pressures(u)).max())
 
     def pull(self, t: float) -> float:
-        """Fastest change of a traction from load time `t` on [MPa/s]."""
-        return self.dead.rate(t) if self.dead is not None else 0.0
+        """Fastest change of a traction or a pressure from load time `t` on [MPa/s]."""
+        return max((loads.rate(t) for loads in (self.dead, self.followers) if loads is not None), default=0.0)
 
 
 def _check_held(space: Space, free: np.ndarray) -> None:
     """Refuse a body that can be moved, or turned, without a force: under dead loads it would be."""
     for i in range(space.dim):
         if free[:, i].all():
-            raise ParameterError(f"no grip holds the body in {_AXES[i]}, and a traction would carry it away: hold a "
+            raise ParameterError(f"no grip holds the body in {_AXES[i]}, and a load would carry it away: hold a "
                                  f"boundary in that direction")
     x = (space.X - space.X.mean(axis=0)) / np.ptp(space.X, axis=0).max()
     modes = [np.broadcast_to(row, x.shape) for row in np.eye(space.dim)]
@@ -126,5 +144,5 @@ def _check_held(space: Space, free: np.ndarray) -> None:
             modes.append(turn)
     grasp = np.array([mode[~free] for mode in modes])
     if np.linalg.eigvalsh(grasp @ grasp.T)[0] < 1e-9:
-        raise ParameterError("the grips let the body turn, and a traction would turn it: hold a boundary at two "
+        raise ParameterError("the grips let the body turn, and a load would turn it: hold a boundary at two "
                              "places, or in one more direction")

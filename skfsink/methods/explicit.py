@@ -4,7 +4,7 @@ Velocity form of the scheme, for the free degrees of freedom:
 
     u_{n+1} = u_n + dt (v_n + dt/2 a_n),   m a_{n+1} = -f(u_{n+1}),   v_{n+1} = v_n + dt/2 (a_n + a_{n+1}),
 
-with f the internal force less the dead loads, and with viscosity the viscous force at u_{n+1} and at the mean velocity
+with f the internal force less the loads, and with viscosity the viscous force at u_{n+1} and at the mean velocity
 of the step that led there.
 
 gamma multiplies stiffness and mass alike, so damage does not lower the stable step. Every few steps gamma is
@@ -14,8 +14,8 @@ With V the mean velocity of a step and f_n = -m a_n, the scheme obeys, exactly,
 
     K_{n+1} - K_n = - (f_n + f_{n+1})/2 . (u_{n+1} - u_n) + dt^2/8 (f_{n+1}.m^-1 f_{n+1} - f_n.m^-1 f_n),
 
-so the dissipation it adds is the difference between that trapezoidal work (with that of the dead loads taken back) and
-the change of stored energy at fixed gamma, less the last term: that is what the ledger books as numerical. With
+so the dissipation it adds is the difference between that trapezoidal work (with that of the loads taken back) and the
+change of stored energy at fixed gamma, less the last term: that is what the ledger books as numerical. With
 viscosity f is the sum of both forces; what in the work and the last term is not of internal forces alone is booked as
 viscous.
 """
@@ -57,7 +57,7 @@ class Explicit:
     length, interval: of the steps, and between solves for gamma.
     dt: the current step [s].   estimates: frequency estimates made.   factorisations: none.
     added_mass: of the smallest elements, over that of the intact body; see :mod:`.raised_mass`.
-    reaction: (n, dim) internal and viscous force less the dead loads.
+    reaction: (n, dim) internal and viscous force less the loads.
     """
 
     GAMMA_TOLERANCE = 1e-6  # relative residual of a solve for gamma
@@ -159,6 +159,8 @@ class Explicit:
         if grip >= self._knot:
             dt, grip = self._knot - state.grip, self._knot
         old, before = self.reaction, None if dead is None else dead.values
+        followers = self.momentum.followers
+        pressures = None if followers is None else followers.values
         self.momentum.set_time(grip)
         (u, v, a), du = self._next, self._du
         move((state.u, state.v, state.a), self._moving, self._grip_velocity, dt, (u, v, du))
@@ -173,12 +175,14 @@ class Explicit:
         energy_fed_in = dt * dt / 8 * swing + (elastic - self._elastic) + (pressed - self._pressed) - trapezoid
         if dead is not None and before is not None:
             energy_fed_in -= dead.effort(before, du)
+        given = self.momentum.pressure_work(state.u, u, pressures)
+        energy_fed_in -= given
         present, initial = elastic + pressed + kinetic, ledger.initial
         energy = max(abs(initial), present, self.body.least_energy)
         if viscous is not None:
             work = viscous_work((viscous, new_viscous), (-self.mass[:, None] * state.a, force), self._inverse, du, dt)
             energy_fed_in += work
-        if dead is not None:
+        if dead is not None or followers is not None:
             initial = max(abs(initial), present)
         if not self.length.accepts(energy_fed_in, energy, initial):
             self.momentum.set_time(state.grip)
@@ -194,6 +198,7 @@ class Explicit:
             self._viscous, self._spare_viscous = new_viscous, viscous
             self._compression = self.momentum.compression
             ledger.viscous += work
+        ledger.book_pressure(given)
         ledger.numerical -= energy_fed_in
         ledger.work += held
         ledger.elastic = self._elastic = elastic

@@ -1,6 +1,6 @@
 """Implicit Hilber-Hughes-Taylor integration (Eq. 25-29), with adaptive steps.
 
-    M a_{n+1} + (1 + alpha) F_{n+1} - alpha F_n = 0,        F: internal and viscous force less the dead loads,
+    M a_{n+1} + (1 + alpha) F_{n+1} - alpha F_n = 0,        F: internal and viscous force less the loads,
     u_{n+1} = u_n + dt v_n + dt^2 [(1/2 - beta) a_n + beta a_{n+1}],
     v_{n+1} = v_n + dt [(1 - g) a_n + g a_{n+1}],       beta = (1 - alpha)^2/4,  g = 1/2 - alpha.
 
@@ -83,7 +83,7 @@ class HHT:
 
     @property
     def reaction(self) -> np.ndarray:
-        """Internal and viscous force of the last accepted state, less the dead loads, (n, dim)."""
+        """Internal and viscous force of the last accepted state, less the loads, (n, dim)."""
         return self._now.force
 
     @property
@@ -97,12 +97,12 @@ class HHT:
         self.momentum.set_time(state.grip)
         self.momentum.set_gamma(state.gamma, state.deleted)
         force, viscous = self._forces(state)
-        self._loads = self._dead_loads
+        self._loads, self._pressures = self._dead_loads, self._pressures_now
         self._now = Balance(force, -force.ravel()[self.free], self.momentum.gamma, self.momentum.W,
                             self.inertia.matrix(), self.inertia.places(), viscous)
 
     def _forces(self, state: State) -> tuple[np.ndarray, np.ndarray | None]:
-        """Internal and viscous force of a state less the dead loads, and the viscous one, None without viscosity."""
+        """Internal and viscous force of a state less the loads, and the viscous one, None without viscosity."""
         force = self.momentum.force(state.u)
         if not self.momentum.is_viscous:
             return force, None
@@ -181,6 +181,10 @@ class HHT:
     def _dead_loads(self) -> np.ndarray | None:
         return None if self.momentum.dead is None else self.momentum.dead.values
 
+    @property
+    def _pressures_now(self) -> np.ndarray | None:
+        return None if self.momentum.followers is None else self.momentum.followers.values
+
     def _book_loads(self, state: State) -> None:
         """Work of the dead loads that have changed at fixed displacement, as where elements under them are gone."""
         if self.momentum.dead is not None and self._loads is not None:
@@ -199,7 +203,7 @@ class HHT:
                      self.body.least_energy)
         if not state.ledger.numerical - ledger.numerical <= self.controls.gain_tolerance * energy:
             return False
-        state.ledger, self._loads = ledger, loads
+        state.ledger, self._loads, self._pressures = ledger, loads, self._pressures_now
         self._rate = (trial.u - state.u) / dt
         state.u, state.gamma, state.sink = trial.u, trial.density.gamma, trial.density.sink
         state.a, state.v = trial.a.copy(), v
@@ -230,6 +234,9 @@ class HHT:
         ledger.numerical += held - stored - motion
         ledger.work += held
         book_viscous(ledger, old, new, du)
+        given = self.momentum.pressure_work(state.u, trial.u, self._pressures)
+        ledger.numerical += given
+        ledger.book_pressure(given)
         if dead is not None and self._loads is not None:
             ledger.numerical += dead.effort(self._loads, du)
             ledger.work += dead.changed(self._loads, state.u + 0.5 * du)

@@ -18,7 +18,7 @@ class Balance(NamedTuple):
 
     Attributes
     ----------
-    force: internal and viscous force less the dead loads, (n, dim).
+    force: internal and viscous force less the loads, (n, dim).
     inertia: M a over the free unknowns, as the scheme has it.
     gamma, W: relative density and stored energy [MPa] at the Gauss points, (ne, nq).
     mass: data of the mass matrix.   places: mass by place, see :meth:`.Inertia.places`.

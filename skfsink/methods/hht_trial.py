@@ -61,7 +61,7 @@ class Trial:
     Attributes
     ----------
     u, a: displacement [mm] and acceleration [mm/s^2] at its end, (n, dim).
-    density: relative density at its end.   force: internal and viscous force less the dead loads there, (n, dim).
+    density: relative density at its end.   force: internal and viscous force less the loads there, (n, dim).
     viscous: viscous force in it, None without viscosity.
     weighted: forces as the scheme weights them, (1 + alpha) F_{n+1} - alpha F_n, over the free unknowns.
     mass: data of the mass matrix.   corrections: Newton steps made.
@@ -185,7 +185,7 @@ class Trial:
 
     def _solve(self, b: np.ndarray) -> np.ndarray:
         """Solution for the right-hand side `b` with the factors, and with lips that press on each other."""
-        solver, B = self.scheme.solver, self.momentum.lips(self.u)
+        solver, B = self.scheme.solver, self.momentum.added_stiffness(self.u, self._free)
         if B is None:
             return solver.solve(b, tolerance=1e-8)
         return solver.solve_sum(np.sqrt(1 + self.scheme.controls.alpha) * B, b)

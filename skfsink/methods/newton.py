@@ -10,6 +10,8 @@ stable, so that the last steps are Newton's.
 from __future__ import annotations
 
 import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.linalg import LinearOperator, gmres
 
 from ..errors import ConvergenceError
 from ..fem.direct import Factorization
@@ -20,7 +22,7 @@ __all__ = ["Newton"]
 
 
 class Newton:
-    """Finds displacements in equilibrium between grips, at the density and dead loads last given to `momentum`.
+    """Finds displacements in equilibrium between grips, at the density and loads last given to `momentum`.
 
     Memory: factors of a tangent, which later calls use as long as they serve: of which equilibrium within `tolerance`
     is found, in how many steps, depends on earlier calls to `equilibrium` and `predict`, whether their increments were
@@ -30,7 +32,7 @@ class Newton:
     ----------
     momentum: forces and tangents.
     free: (n*dim,) mask of the degrees of freedom that no grip holds.
-    tolerance: residual force at which equilibrium is reached, relative to the forces inside and the dead loads.
+    tolerance: residual force at which equilibrium is reached, relative to the forces inside and the loads.
     most: Newton steps after which an equilibrium is given up, unless a call says more.
     threads: of the factorisations.
 
@@ -47,6 +49,7 @@ class Newton:
     WORTH = (10, 24)  # iterations that take as long as a factorisation, on a body of 50,000 elements
     LEAST_J = 0.05  # of a Gauss point that still carries force; below, a trial is refused
     SHORTEST = 1e-6  # step length at which a direction is given up
+    RIM = 60         # iterations of GMRES, for the rim of a pressurised surface
 
     def __init__(self, momentum: Momentum, free: np.ndarray, tolerance: float, most: int, threads: int = 1) -> None:
         self.momentum, self.free, self.tolerance, self.most = momentum, free, tolerance, most
@@ -80,7 +83,7 @@ class Newton:
         energy = momentum.potential
         lowest = min(self.LEAST_J, momentum.least_J)
         last, length, modified = np.inf, 1.0, False
-        pulled = 0.0 if momentum.dead is None else float(np.linalg.norm(momentum.dead.values))
+        pulled = momentum.load_size(u)
         for _ in range(most):
             r = force.ravel()[self.free]
             error = float(np.linalg.norm(r[live]) / (np.linalg.norm(force) + self._least_force + pulled))
@@ -95,7 +98,7 @@ class Newton:
             step, fresh = np.zeros(u.shape), False
             while True:
                 if modified:
-                    d = self._solve(r, momentum.lips(u))
+                    d = self._solve(r, momentum.added_stiffness(u, self.free))
                 else:
                     d, fresh = self._direction(u, r)
                 step.reshape(-1)[self.free] = d
@@ -135,8 +138,9 @@ class Newton:
     def _direction(self, u: np.ndarray, r: np.ndarray, tolerance: float = INEXACT) -> tuple[np.ndarray, bool]:
         """A step that lowers the residual force `r` at `u`, and whether the factors behind it are those of `u`."""
         data = self.momentum.tangent(self.pattern, u)
-        lips = self.momentum.lips(u)
-        if self._kept is not None and lips is None and self._spent < self.WORTH[self.space.dim - 2]:
+        added, followers = self.momentum.added_stiffness(u, self.free), self.momentum.followers
+        skew = None if followers is None else followers.skew(u, self.free)
+        if self._kept is not None and added is None and skew is None and self._spent < self.WORTH[self.space.dim - 2]:
             most = self.MOST[self.space.dim - 2]
             d, iterations, met = self.solver.conjugate(data, -r, tolerance, most)
             self.iterations += iterations
@@ -146,7 +150,33 @@ class Newton:
             if met or iterations > most // 2:
                 return d, False
         self._factorise(u, data)
-        return self._solve(r, lips), True
+        if skew is None or not self.solver.definite:
+            return self._solve(r, added), True
+        d, iterations = self._krylov(data, skew, added, r)
+        self.iterations += iterations
+        return d, True
+
+    def _krylov(self, data: np.ndarray, skew: csr_array, added: np.ndarray | None,
+                r: np.ndarray) -> tuple[np.ndarray, int]:
+        """Solution of (K + S + B B^T) d = -r with the skew part `skew` of the load stiffness, and iterations made.
+
+        GMRES, with the factors of K as preconditioner. They are few: S acts on the rim of a pressurised surface only.
+        """
+        count, matrix = 0, self.pattern.symmetric(data) + skew
+
+        def times(x: np.ndarray) -> np.ndarray:
+            y: np.ndarray = matrix @ x
+            return y if added is None else y + added @ (added.T @ x)
+
+        def counted(_: float) -> None:
+            nonlocal count
+            count += 1
+
+        shape = matrix.shape
+        d, _ = gmres(LinearOperator(shape, times, dtype=float), -r, rtol=1e-10, restart=self.RIM, maxiter=1,
+                     M=LinearOperator(shape, lambda b: -self._solve(b, added), dtype=float), callback=counted,
+                     callback_type="pr_norm")
+        return d, count
 
     def _solve(self, r: np.ndarray, B: np.ndarray | None) -> np.ndarray:
         """Solution of (K + B B^T) d = -r with the factors of K; without B of K d = -r."""
@@ -174,9 +204,11 @@ class Newton:
         """
         momentum, length, force = self.momentum, 1.0, np.empty_like(u)
         while slope < 0.0 and length >= self.SHORTEST:
-            momentum.force(u + length * step, force)
+            end = u + length * step
+            momentum.force(end, force)
             fits = momentum.least_J >= lowest and np.isfinite(momentum.energy)
-            if fits and momentum.potential <= energy + 1e-4 * length * slope + self._noise:
+            if fits and (momentum.potential - momentum.pressure_work(u, end)
+                         <= energy + 1e-4 * length * slope + self._noise):
                 return length, force
             length *= 0.5
         return 0.0, force

@@ -189,7 +189,7 @@ class StaticLoading:
         ConvergenceError
             There is no equilibrium under the smallest increment.
         """
-        c, dead = self.controls, self.momentum.dead
+        c, dead, followers = self.controls, self.momentum.dead, self.momentum.followers
         ledger, self.unfailed = state.ledger, ""
         held = ~self.free.reshape(state.u.shape)
         self.momentum.set_time(state.grip)
@@ -206,6 +206,7 @@ class StaticLoading:
             end = self.clock.end(state.grip, self.increment)
             increment = self.increment if end == state.grip + self.increment else end - state.grip
             before = None if dead is None else dead.values
+            pressures = None if followers is None else followers.values
             self.momentum.set_time(end)
             self.momentum.set_gamma(state.gamma, state.deleted)
             try:
@@ -221,7 +222,7 @@ class StaticLoading:
                     raise ConvergenceError("the body finds no equilibrium under the smallest load increment")
                 if (state.step and self.refused != "softens"  # which has a shorter increment that is taken
                         and self.increment <= c.onset_tolerance * (self.clock.age(state.grip) + self.increment)):
-                    self._doubt()
+                    self._doubt(state)
                     self.momentum.set_gamma(state.gamma, state.deleted)
                     self.momentum.force(state.u)
                     return
@@ -230,6 +231,7 @@ class StaticLoading:
             trial.work += 0.5 * float(np.sum((force + settled.force)[held] * (settled.u - state.u)[held]))
             if dead is not None and before is not None:
                 trial.work += dead.changed(before, 0.5 * (state.u + settled.u))
+            trial.book_pressure(self.momentum.pressure_work(state.u, settled.u, pressures, equilibria=True))
             intact = self.momentum.effective(state.gamma, state.deleted)
             self.momentum.set_gamma(settled.density.gamma, state.deleted)
             trial.drop(self.space.w, 0.5 * (W + settled.W), intact, self.momentum.gamma)
@@ -268,12 +270,16 @@ class StaticLoading:
                         "take a material that stiffens", stretch, self.STRETCHED)
         return bool(self.unfailed)
 
-    def _doubt(self) -> None:
+    def _doubt(self, state: State) -> None:
         """Say so where the onset is not where the sink runs away."""
         if self.refused == "passes" and self.factor < self.STALLED:
             log.warning("the onset may be too low: the last load increment was given up after %d passes over the two "
                         "fields while the change of gamma still fell (by a factor of %.3f a pass); raise max_passes",
                         self.controls.max_passes, self.factor)
+        elif self.refused == "no equilibrium" and self.loading.rises_in_pressure(state.grip):
+            log.warning("the onset is the greatest pressure that the body bears (%.4g MPa), not where the sink runs "
+                        "away: past it there is no equilibrium at a given pressure; a filling in the place of the "
+                        "pressure goes on past it", self.loading.greatest_pressure(state.u))
         elif self.refused == "no equilibrium":
             log.warning("the onset is where Newton's method ends, not where the sink runs away: the body may buckle or "
                         "be torn by its grips; refine the mesh, or check grips and constants")

@@ -70,9 +70,11 @@ class Statics(StaticLoading):
                     self.arrested = f"the grips are at {limit:g} times their way to the onset"
                     return
             else:
-                before = self.momentum.potential
+                before, start = self.momentum.potential, state.u
                 state.u = self._relax(state)
-                ledger.released += before - self.momentum.potential
+                given = self.momentum.pressure_work(start, state.u)
+                ledger.released += before - self.momentum.potential + given
+                ledger.book_pressure(given)
             W, loads = self.momentum.W, None if dead is None else dead.values
             postponed = self._follow(state, W)
             new = self.density.update(state.W_max, Density(state.gamma, state.sink))
@@ -105,8 +107,10 @@ class Statics(StaticLoading):
             return self.newton.equilibrium(state.u, most=self.SNAP)[0]
         except ConvergenceError as error:
             cure = "take another mesh, or --analysis dynamic"
-            if self.momentum.dead is not None:
-                cure = "a body that tractions tear has none; take --analysis dynamic, or move a grip instead"
+            dead, followers = self.momentum.dead, self.momentum.followers
+            if dead is not None or followers is not None:
+                cure = (f"a body that {'pressures' if dead is None else 'tractions'} tear has none; take --analysis "
+                        f"dynamic, or move a grip instead")
             raise ConvergenceError(f"pass {state.step + 1}: {error}; the history follows equilibria only: "
                                    f"{cure}") from None
 
@@ -146,11 +150,14 @@ class Statics(StaticLoading):
         end = self.clock.end(state.grip, increment)
         increment = increment if end == state.grip + increment else end - state.grip
         before = None if dead is None else dead.values
+        followers = self.momentum.followers
+        pressures = None if followers is None else followers.values
         self.momentum.set_time(end)
         u, new_force = self.newton.equilibrium(self._predict(state.u, increment, state.grip), most=self.SNAP)
         state.ledger.work += 0.5 * float(np.sum((force + new_force)[held] * (u - state.u)[held]))
         if dead is not None and before is not None:
             state.ledger.work += dead.changed(before, 0.5 * (state.u + u))
+        state.ledger.book_pressure(self.momentum.pressure_work(state.u, u, pressures, equilibria=True))
         state.u, state.grip = u, end
         return True
 

@@ -93,7 +93,7 @@ class StepLength:
             self.estimates += 1
             self.urgent = False
         swings = self._omega > 0.0  # else every node is held
-        omega = self._with_contact(self._omega * np.sqrt(max(1.0, ratio)), u)
+        omega = self._with_others(self._omega * np.sqrt(max(1.0, ratio)), u, inverse)
         dt = float(c.courant * 2.0 / omega) if swings else self._still
         if swings and self.momentum.is_viscous:
             slope = self.momentum.bulk_viscosity.slope
@@ -104,16 +104,20 @@ class StepLength:
     def share(self, u: np.ndarray, mass: np.ndarray, inverse: np.ndarray, compression: float = 0.0) -> float:
         """The step over the stability limit of a body as it is now; nothing is changed."""
         omega, _ = highest_frequency(self.momentum, self._pattern, self.free, u, mass, self.mode)
-        omega = self._with_contact(max(omega, self.momentum.stiffest(u, inverse) ** 0.5), u)
+        omega = self._with_others(max(omega, self.momentum.stiffest(u, inverse) ** 0.5), u, inverse)
         if self.momentum.is_viscous and omega > 0.0:
             damping = highest_damping(self.momentum, self._pattern, self.free, u, mass, compression=compression)
             return self.dt / stable_step(omega, damping)
         return 0.5 * self.dt * omega
 
-    def _with_contact(self, omega: float, u: np.ndarray) -> float:
-        """Bound of the highest frequency with contact, from that without it [1/s]."""
-        contact = self.momentum.contact
-        return omega if contact is None else float((omega**2 + contact.stiffest(u)) ** 0.5)
+    def _with_others(self, omega: float, u: np.ndarray, inverse: np.ndarray) -> float:
+        """Bound of the highest frequency with contact and fluids, from that without them [1/s]."""
+        contact, followers = self.momentum.contact, self.momentum.followers
+        if contact is None and followers is None:
+            return omega
+        added = 0.0 if contact is None else contact.stiffest(u)
+        added += 0.0 if followers is None else followers.stiffest(u, inverse)
+        return float((omega**2 + added) ** 0.5)
 
     def accepts(self, error: float, energy: float, initial: float) -> bool:
         """Whether a step may be taken that feeds in the `error` of the `energy` of the body; it is halved if not.

@@ -235,9 +235,9 @@ def ledger_picture(history: History, path: str | Path, title: str = "") -> None:
             ax.fill_between(time, total, total + event[name], label=meaning, color=colour, linewidth=0)
             total = total + event[name]
     ax.plot(time, total, "k", label="total")
-    if np.any(event["loads"]):
+    if np.any(event["loads"]) or np.any(event["pressure_work"]):
         fed_in = total[0] + event["loads"][0] + event["work"] - event["loads"]
-        ax.plot(time, fed_in, ":", color="#d9a441", label="start, work\nand dead loads")
+        ax.plot(time, fed_in, ":", color="#d9a441", label="start, work\nand loads")
     ax.plot(time, event["U_paper"], "k--", label="$U$ of the paper")
     ax.set(ylabel=f"energy ({unit})", ylim=(0, None))
     figure.legend(*(entry[::-1] for entry in ax.get_legend_handles_labels()), loc="outside right upper")

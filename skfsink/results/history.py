@@ -14,8 +14,8 @@ import numpy as np
 from ..errors import OutputError
 from ..system.files import reported, write_atomic
 
-__all__ = ["HISTORY_COLUMNS", "Column", "History", "Table", "deletions_header", "history_header", "history_units",
-           "load_name", "onset_load"]
+__all__ = ["HISTORY_COLUMNS", "OF_PRESSURES", "Column", "History", "Table", "deletions_header", "history_header",
+           "history_units", "load_name", "onset_load"]
 
 
 class Column(NamedTuple):
@@ -35,7 +35,7 @@ class Column(NamedTuple):
     before: Any = None
 
 
-_FORCE, _ENERGY = "N/mm", "N mm/mm"  # of a plane body
+_FORCE, _ENERGY, _VOLUME = "N/mm", "N mm/mm", "mm^2"  # of a plane body
 #: Columns of a history, in order. Energies are those of :class:`.energy.Ledger`; what each column says of a run is in
 #: :data:`skfsink.run.observers.history.VALUES`.
 HISTORY_COLUMNS: dict[str, Column] = {
@@ -49,7 +49,11 @@ HISTORY_COLUMNS: dict[str, Column] = {
     "contact": Column("energy of the lips of cracks that bear on each other; only in runs with contact", _ENERGY,
                       before=0.0),
     "kinetic": Column("gamma-weighted kinetic energy", _ENERGY),
-    "work": Column("work of the grips, and of dead loads that change", _ENERGY),
+    "work": Column("work of the grips, of pressures, and of dead loads that change", _ENERGY),
+    "pressure_work": Column("of that, work of pressures; only in runs with pressures", _ENERGY, before=0.0),
+    "pressure_MPa": Column("the first pressure; only in runs with pressures", "MPa", before=0.0),
+    "swept_volume": Column("volume by which the boundary of the first pressure has opened; only in runs with pressures",
+                           _VOLUME, before=0.0),
     "sink_stored": Column("stored energy taken by the sink, the first part of D", _ENERGY),
     "sink_kinetic": Column("kinetic energy taken by the sink, the second part of D", _ENERGY),
     "deletion": Column("energy left in elements when they were deleted", _ENERGY),
@@ -69,9 +73,11 @@ HISTORY_COLUMNS: dict[str, Column] = {
     "gamma_min": Column("least relative density of a node"),
     "dt_s": Column("time step", "s"),
 }
-_IN_SPACE = {_FORCE: "N", _ENERGY: "N mm"}
+#: Columns that only runs with pressures have.
+OF_PRESSURES = ("pressure_work", "pressure_MPa", "swept_volume")
+_IN_SPACE = {_FORCE: "N", _ENERGY: "N mm", _VOLUME: "mm^3"}
 _SUFFIX = {"s": "_s", "mm": "_mm", "m/s": "_m_per_s", "N/mm": "_N_per_mm", "N": "_N", "N mm/mm": "_N_mm_per_mm",
-           "N mm": "_N_mm", "1": "", "": ""}
+           "N mm": "_N_mm", "MPa": "_MPa", "mm^2": "_mm2", "mm^3": "_mm3", "1": "", "": ""}
 _MISSING: dict[type, Any] = {str: "", int: 0, float: math.nan}
 
 

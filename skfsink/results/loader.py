@@ -48,7 +48,8 @@ ENERGIES: tuple[tuple[str, tuple[str, ...], str], ...] = (
     ("numerical", ("numerical",), "dissipated by the time integration"),
     ("viscous", ("viscous",), "dissipated by viscosity"),
     ("released", ("released",), "released in relaxing to equilibrium"),
-    ("work", ("work",), "work of the grips during the event"),
+    ("work", ("work",), "work of the grips and of pressures during the event"),
+    ("pressure_work", ("pressure_work",), "of the work: of pressures"),
     ("balance", ("balance",), "balance: what does not add up"),
     ("U", ("U_paper",), "U of the paper, Σ A ψ_f of failed elements"),
 )

@@ -136,9 +136,9 @@ def refuse(scene: Scene) -> None:
             raise ParameterError(f"nothing holds {motion.piece}: its nodes are in no grip, nor joined to a piece that "
                                  f"is held; merge nodes that coincide, or hold it at a boundary")
     if not any(loading.speed(t) > 0.0 or loading.pull(t) > 0.0 for t in (0.0, *loading.knots)):
-        raise ParameterError("nothing loads the body: all its grips and tractions are still; give one of them a "
-                             "velocity (a rate), or a ramp that rises")
-    if not scene.tractions and moves_as_a_whole(space, loading, label):
+        raise ParameterError("nothing loads the body: all its grips, tractions and pressures are still; give one of "
+                             "them a velocity (a rate), or a ramp that rises")
+    if not (scene.tractions or scene.pressures) and moves_as_a_whole(space, loading, label):
         whole = "the body" if count == 1 else f"each of the {count} pieces of the body, which are not joined,"
         raise ParameterError(f"the grips move {whole} as a whole and strain nothing: hold another boundary in the "
                              f"direction of the one that moves{', or merge nodes that coincide' if count > 1 else ''}")
@@ -211,7 +211,8 @@ def _loads(scene: Scene, speed: float, pull: float) -> str:
     """What is fast, and how fast."""
     if speed >= pull:
         return f"grips part at {speed * _slowest(scene):.3g} m/s"
-    return f"tractions strain the body as grips that part at {pull * _slowest(scene):.3g} m/s"
+    what = "tractions" if scene.tractions else "pressures"
+    return f"{what} strain the body as grips that part at {pull * _slowest(scene):.3g} m/s"
 
 
 # --- what may be meant ---

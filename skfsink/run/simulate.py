@@ -169,7 +169,12 @@ class Simulation:
     def _begin_event(self) -> None:
         """Start a new ledger at the onset, from rest just past it unless the body has come there in motion."""
         state, overshoot = self.state, 0.0 if self._from_rest else self.scene.controls.overshoot
+        followers = self.momentum.followers
+        pressures = None if followers is None else (1.0 + overshoot) * followers.pressures(state.u)
         state.begin_event(overshoot, self.statics.clock.grown(state.grip, overshoot))
+        if followers is not None and pressures is not None:
+            followers.at(state.grip)
+            followers.hold(state.u, pressures)
         reaction = self.body.take(state)
         if self.scene.controls.analysis == "quasistatic":
             state.ledger.elastic, state.ledger.loads = self.momentum.energy, self.momentum.loads

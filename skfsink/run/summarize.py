@@ -65,6 +65,8 @@ def summarize(scene: Scene, simulation: Simulation) -> dict[str, Any]:
                    "external_work": onset.get("work", 0.0) + ledger.work, "deletion": ledger.deletion,
                    "numerical": ledger.numerical, "released": ledger.released,
                    **{name: getattr(ledger, name) for name in OPTIONAL_TERMS if name not in without},
+                   **({} if simulation.momentum.followers is None else
+                      {"pressure_work": onset.get("pressure_work", 0.0) + ledger.pressure_work}),
                    "balance_error_relative": max(balances, default=0.0) / onset["elastic_energy"] if onset else None},
         "quantities": measured(scene, simulation), "model": dict(scene.model_choice) or None,
         "whole": {"energy": scene.whole.energy, "load": scene.whole.load, "displacement": scene.whole.displacement},
@@ -81,6 +83,6 @@ def summarize(scene: Scene, simulation: Simulation) -> dict[str, Any]:
 def _material_point(scene: Scene, simulation: Simulation) -> dict[str, Any] | None:
     """Strength beside theory of a body that was loaded evenly."""
     greatest = simulation.strength.greatest
-    if not simulation.guard.even or "F" not in greatest or scene.tractions:
+    if not simulation.guard.even or "F" not in greatest or scene.tractions or scene.pressures:
         return None
     return beside_theory(scene, np.array(greatest["F"]), np.array(greatest["P"]))

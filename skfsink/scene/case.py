@@ -23,7 +23,8 @@ from .typed import Mistake, Record
 
 __all__ = ["Case", "CaseParameter", "shared_parameters"]
 
-NEWER = ("merge_nodes",)  # parameters that a scene.toml of an earlier version has not; they take their defaults
+#: parameters that a scene.toml of an earlier version has not; they take their defaults
+NEWER = ("merge_nodes", "pressures", "fillings")
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,7 @@ class CaseParameter:
 
     @property
     def has_tables(self) -> bool:
-        """Whether its value is a sequence of tables: grips, tractions, regions."""
+        """Whether its value is a sequence of tables, as grips and regions are."""
         return self.name in TABLES
 
 

@@ -14,6 +14,7 @@ from ..fem.elements import check_element
 from ..fem.space import Space
 from ..loads.grips import Grip, Ramp, Traction
 from ..loads.nodal import NodalLoads
+from ..loads.pressure import Filling, Pressure
 from ..loads.schedule import Loading
 from ..material import Material, SinkLaw
 from ..material.regions import Region, check_lengths, divided
@@ -42,6 +43,8 @@ class Scene:
     sample, material, sink_law: what is computed.
     grips: the reaction of the first one that moves is the load that is reported, along its motion.
     tractions: dead loads; without a grip that moves, the first one is the load that is reported.
+    pressures: pressures that follow the surface, given or of a fluid; without a grip that moves and a traction, the
+        first one is the load that is reported.
     loads: dead loads of other kinds, each made from the spaces by a function or an object that is called.
     regions: elements of other materials than `material`; no element is in two.
     faces: in three dimensions, the surfaces of a sheet along which a crack runs; they are no edges it arrives at.
@@ -69,6 +72,7 @@ class Scene:
     sink_law: SinkLaw
     grips: tuple[Grip, ...]
     tractions: tuple[Traction, ...] = ()
+    pressures: tuple[Pressure | Filling, ...] = ()
     loads: tuple[Callable[[Space], NodalLoads], ...] = ()
     regions: tuple[Region, ...] = ()
     faces: tuple[str, ...] = ()
@@ -81,7 +85,8 @@ class Scene:
     model_choice: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for boundary in (load.boundary for group in (self.grips, self.rollers, self.tractions) for load in group):
+        for boundary in (load.boundary for group in (self.grips, self.rollers, self.tractions, self.pressures)
+                         for load in group):
             self.sample.nodes(boundary)
         for name in self.faces:
             if name not in self.sample.boundaries:
@@ -93,8 +98,9 @@ class Scene:
         check_lengths(self.sink_law, self.regions)
         _ = self.parts
         loading = self.loading()
-        if self.controls.start == "rest" and (loading.knots or loading.dead):
-            what = "tractions" if self.tractions else "dead loads" if loading.dead else "ramps"
+        if self.controls.start == "rest" and (loading.knots or loading.dead or loading.followers):
+            what = ("tractions" if self.tractions else "dead loads" if loading.dead else
+                    "pressures" if loading.followers else "ramps")
             raise ParameterError(f"start rest is for grips of constant velocity; this scene has {what}: take start "
                                  f"onset")
         if self.controls.start == "rest" and loading.speed(0.0) == 0.0:
@@ -135,7 +141,8 @@ class Scene:
         nodes = self.sample.nodes
         return Loading(self.sample.space, [(nodes(grip.boundary), grip) for grip in (*self.grips, *self.rollers)],
                        [(nodes(traction.boundary), traction) for traction in self.tractions],
-                       [make(self.sample.space) for make in self.loads])
+                       [make(self.sample.space) for make in self.loads],
+                       [(nodes(load.boundary), load) for load in self.pressures])
 
     def constraints(self) -> tuple[np.ndarray, np.ndarray]:
         """Mask of the free degrees of freedom (n*dim,) and velocity of the held ones at first (n, dim) [mm/s]."""
@@ -175,4 +182,5 @@ class Scene:
         space = self.sample.space
         return digest([text, space.X, space.conn, self.sample.boundaries, controls,
                        tuple(backend(controls.kernels)), self.material, self.sink_law, self.regions, self.grips,
-                       self.rollers, self.tractions, self.loads, self.faces, self.whole])
+                       self.rollers, self.tractions, self.loads, self.faces, self.whole,
+                       *((self.pressures,) if self.pressures else ())])

@@ -1,10 +1,15 @@
-"""Grips, tractions and regions as the tables of a deck, with units, and back.
+"""Grips, loads and regions as the tables of a deck, with units, and back.
 
     [[grips]]                                   [[tractions]]                  [[regions]]
     boundary = "top"                            boundary = "right"             name = "inclusion"
     x = 0                                       x = "10 kPa/s"                 material = "neo-hookean"
     y = "1e-3 mm/s"                                                            constants = "mu = 2 MPa"
     z = [["0 s", "0 mm"], ["10 s", "0.2 mm"]]                                  phi = "1 MPa"
+
+    [[pressures]]                               [[fillings]]
+    boundary = "inner"                          boundary = "inner"
+    value = "16 kPa"                            inflow = "1 mm^3/s"
+    in_crack = true                             compliance = "0.1 mm^3/kPa"
 """
 
 from __future__ import annotations
@@ -17,15 +22,17 @@ from typing import Annotated, Any, get_type_hints
 
 from ..errors import ParameterError, require
 from ..loads.grips import Grip, Ramp, Traction
+from ..loads.pressure import Filling, Pressure
 from ..material import MATERIALS, own_constants
 from ..material.regions import RegionLaw, one_bulk_modulus
-from ..units import number_in
+from ..units import Unit, number_in
 from .typed import Mistake, Record
 
-__all__ = ["grips_of", "read_tables", "regions_of", "tractions_of"]
+__all__ = ["grips_of", "pressures_of", "read_tables", "regions_of", "tractions_of"]
 
 AXES = ("x", "y", "z")
 MOST = 1000  # tables of a kind, points of a ramp
+RISE = 1.0   # load time [s] in which a pressure that is given by its value rises to it
 
 
 @dataclass(frozen=True)
@@ -50,6 +57,19 @@ class Course:
             raise ParameterError(f": {error}") from None
 
 
+@dataclass(frozen=True)
+class PressureCourse(Course):
+    """The same for a pressure: a number is its value in the `unit`, to which it rises in the first second."""
+
+    def read(self, value: Any) -> list[list[float]]:
+        """The ramp in plain numbers."""
+        if not isinstance(value, list | tuple):
+            value = [[0.0, 0.0], [RISE, require("", number_in("", value, self.unit), self.unit)]]
+        ramp = super().read(value)
+        assert isinstance(ramp, list)
+        return ramp
+
+
 def _message(kind: str, mistake: Mistake, table: Any) -> str:
     key = next(iter(TYPES[kind]))
     if not mistake.field:
@@ -65,8 +85,13 @@ def _message(kind: str, mistake: Mistake, table: Any) -> str:
 TYPES: Mapping[str, Mapping[str, Any]] = {
     "grips": {"boundary": str, **dict.fromkeys(AXES, Annotated[list, Course("mm/s", "mm")])},
     "tractions": {"boundary": str, **dict.fromkeys(AXES, Annotated[list, Course("MPa/s", "MPa")])},
+    "pressures": {"boundary": str, "value": Annotated[list, PressureCourse("MPa/s", "MPa")],
+                  "rate": Annotated[float, Unit("MPa/s")], "in_crack": bool},
+    "fillings": {"boundary": str, "inflow": Annotated[list, Course("mm^3/s", "mm^3")],
+                 "compliance": Annotated[float, Unit("mm^3/MPa")]},
     "regions": get_type_hints(RegionLaw, include_extras=True)}
-RECORDS = {kind: Record(types, partial(_message, kind), needed=[next(iter(types))], finite=True)
+NEEDED = {"fillings": ("boundary", "inflow", "compliance")}
+RECORDS = {kind: Record(types, partial(_message, kind), needed=NEEDED.get(kind, (next(iter(types)),)), finite=True)
            for kind, types in TYPES.items()}
 
 
@@ -83,6 +108,13 @@ def read_tables(kind: str, tables: Any) -> tuple[dict[str, Any], ...]:
     read = [RECORDS[kind].read(_table(table)) for table in tables]
     if kind == "regions":
         return tuple(map(_with_constants, read))
+    if kind == "pressures":
+        for table in read:
+            if ("value" in table) == ("rate" in table):
+                raise ParameterError(f"pressure {table['boundary']} must have a value (a pressure, or a ramp of points "
+                                     f"[time, pressure]) or a rate; got {'both' if 'rate' in table else 'neither'}")
+    if kind in ("pressures", "fillings"):
+        return tuple(read)
     return tuple({name: course for name, course in table.items() if kind == "grips" or course != 0.0} for table in read)
 
 
@@ -102,11 +134,16 @@ def _with_constants(table: Mapping[str, Any]) -> dict[str, Any]:
 
 # --- objects and their tables ---
 def _table(item: Any) -> Any:
-    """The table of a grip, a traction or a region; anything else as it is."""
+    """The table of a grip, a load or a region; anything else as it is."""
     if isinstance(item, Grip):
         return {"boundary": item.boundary, **{axis: _plain(v) for axis, v in zip(AXES, item.velocity) if v is not None}}
     if isinstance(item, Traction):
         return {"boundary": item.boundary, **{axis: _plain(v) for axis, v in zip(AXES, item.rate) if v != 0.0}}
+    if isinstance(item, Pressure):
+        name = "value" if isinstance(item.rate, Ramp) else "rate"
+        return {"boundary": item.boundary, name: _plain(item.rate), **({"in_crack": True} if item.in_crack else {})}
+    if isinstance(item, Filling):
+        return {"boundary": item.boundary, "inflow": _plain(item.inflow), "compliance": _plain(item.compliance)}
     if isinstance(item, RegionLaw):
         return {name: value for name, value in asdict(item).items() if value or name in ("name", "material")}
     return item
@@ -131,6 +168,15 @@ def tractions_of(tables: Sequence[Mapping[str, Any]], dim: int) -> tuple[Tractio
                  for table in read_tables("tractions", tables))
 
 
+def pressures_of(pressures: Sequence[Mapping[str, Any]],
+                 fillings: Sequence[Mapping[str, Any]]) -> tuple[Pressure | Filling, ...]:
+    """Pressures and fillings from their tables; pressures come first."""
+    given = [Pressure(table["boundary"], _course(table["value"]) if "value" in table else table["rate"],
+                      table.get("in_crack", False)) for table in read_tables("pressures", pressures)]
+    return (*given, *(Filling(table["boundary"], _course(table["inflow"]), table["compliance"])
+                      for table in read_tables("fillings", fillings)))
+
+
 def regions_of(tables: Sequence[Mapping[str, Any]]) -> tuple[RegionLaw, ...]:
     """What regions are made of, from their tables."""
     return tuple(RegionLaw(**table) for table in read_tables("regions", tables))
@@ -140,4 +186,9 @@ def _components(kind: str, table: Mapping[str, Any], dim: int, missing: float | 
     courses = [table.get(axis, missing) for axis in AXES]
     if any(course not in (None, 0.0) for course in courses[dim:]):
         raise ParameterError(f"{kind} {table['boundary']} has a component z, and the mesh is plane")
-    return tuple(Ramp(*zip(*course)) if isinstance(course, list) else course for course in courses[:dim])
+    return tuple(_course(course) for course in courses[:dim])
+
+
+def _course(course: Any) -> Any:
+    """The ramp of a list of points; anything else as it is."""
+    return Ramp(*zip(*course)) if isinstance(course, list) else course

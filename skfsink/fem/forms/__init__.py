@@ -16,8 +16,9 @@ the same for all test functions is found once an assembly.
 from .density import DensityForms, density_forms, row_sums
 from .kinematics import element_mean
 from .momentum import MomentumForms, momentum_forms
+from .pressure import PressureForms, pressure_forms
 from .sheet import plane_stress_forms
 from .viscous import BulkViscosity, ViscousForms, viscous_forms
 
-__all__ = ["BulkViscosity", "DensityForms", "MomentumForms", "ViscousForms", "density_forms", "element_mean",
-           "momentum_forms", "plane_stress_forms", "row_sums", "viscous_forms"]
+__all__ = ["BulkViscosity", "DensityForms", "MomentumForms", "PressureForms", "ViscousForms", "density_forms",
+           "element_mean", "momentum_forms", "plane_stress_forms", "pressure_forms", "row_sums", "viscous_forms"]

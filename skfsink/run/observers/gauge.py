@@ -21,7 +21,8 @@ class Gauge:
     motion in the last stretch of time in which it moves, or away from where it began if it moves back then. The
     displacement is that of this grip relative to the last other one, in the same direction. Without a grip that moves
     they are those of the first traction: its force, and the mean displacement of its boundary relative to that of the
-    last other traction, or to the grips.
+    last other traction, or to the grips. Without these they are those of the first pressure: its force, pressure times
+    the deformed area of its boundary, and the volume by which the boundary has opened over its undeformed area.
     """
 
     def __init__(self, scene: Scene, loading: Loading) -> None:
@@ -36,16 +37,21 @@ class Gauge:
         self._others = None if other is None else scene.sample.nodes(other.boundary)
         self._clock = not any(isinstance(v, Ramp) for grip in (self._grip, other) if grip for v in grip.velocity)
 
-    def load(self, reaction: np.ndarray) -> float:
-        """The load for the `reaction` (n, dim), the force of the body less the dead loads [N; N/mm in 2D]."""
+    def load(self, reaction: np.ndarray, u: np.ndarray) -> float:
+        """The load [N; N/mm in 2D] for the `reaction`, force of the body less the loads, at displacement `u` (n, dim).
+        """
         if self._grip is not None:
             return float((reaction[self._nodes] @ self._direction).sum())
-        loads = self.loading.tractions
+        loads, followers = self.loading.tractions, self.loading.followers
+        if loads is None and followers is not None:
+            return float(followers.pressures(u)[0] * followers.area(u)[0])
         return 0.0 if loads is None else float(loads.resultant(0) @ self._direction)
 
     def displacement(self, state: State) -> float:
         """The displacement [mm]."""
         if self._grip is None:
+            if self.loading.tractions is None and (followers := self.loading.followers) is not None:
+                return float(followers.swept(state.u)[0] / followers.areas[0])
             return self._of_traction(state.u)
         if self._clock:
             return state.grip * self.scene.speed

@@ -6,9 +6,12 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
+import numpy as np
+
 from ...errors import CheckpointError, ParameterError
 from ...fields.momentum import terms_without
-from ...results.history import HISTORY_COLUMNS, deletions_header
+from ...loads.follower import FollowerLoads
+from ...results.history import HISTORY_COLUMNS, OF_PRESSURES, deletions_header
 from ...results.history import History as Rows
 from ...system.files import write_atomic
 from .observer import Observer
@@ -32,6 +35,15 @@ def _energy(name: str) -> Callable[[View], float]:
     return lambda view: float(getattr(view.state.ledger, name))
 
 
+def _of_pressures(quantity: Callable[[FollowerLoads, np.ndarray], np.ndarray]) -> Callable[[View], float]:
+    """A quantity of the first pressure; 0 without pressures."""
+    def value(view: View) -> float:
+        followers = view.body.loading.followers
+        return 0.0 if followers is None else float(quantity(followers, view.state.u)[0])
+
+    return value
+
+
 #: what each column of :data:`.HISTORY_COLUMNS` says of a run
 VALUES: dict[str, Callable[[View], Any]] = {
     "phase": lambda view: view.state.phase,
@@ -39,8 +51,11 @@ VALUES: dict[str, Callable[[View], Any]] = {
     "time_s": lambda view: 0.0 if _timeless(view) else view.state.time,
     "grip_displacement_mm": lambda view: view.displacement,
     "reaction_N_per_mm": lambda view: view.load,
-    **{name: _energy(name) for name in ("elastic", "loads", "contact", "kinetic", "work", "sink_stored", "sink_kinetic",
-                                        "deletion", "numerical", "released", "viscous", "balance")},
+    **{name: _energy(name) for name in ("elastic", "loads", "contact", "kinetic", "work", "pressure_work",
+                                        "sink_stored", "sink_kinetic", "deletion", "numerical", "released", "viscous",
+                                        "balance")},
+    "pressure_MPa": _of_pressures(lambda followers, u: followers.pressures(u)),
+    "swept_volume": _of_pressures(lambda followers, u: followers.swept(u)),
     "U_paper": _energy("paper"),
     "tip_x_mm": _tip(0), "tip_y_mm": _tip(1), "tip_z_mm": _tip(2),
     "crack_length_mm": lambda view: view.tips.length,
@@ -95,6 +110,8 @@ class History(Observer):
     def prepare(self, view: View) -> None:
         """Begin the file with the rows so far."""
         without = terms_without(view.body.momentum, not view.quasistatic)
+        if view.body.loading.followers is None:
+            without += OF_PRESSURES
         self._table = Rows(view.folder / "history.csv", self._kept, view.body.space.dim, without)
 
     def loading(self, view: View) -> None:

@@ -54,6 +54,7 @@ class Onset(Observer):
         ratio, place = greatest_ratio(view.body.density, state)
         self.figures = {"displacement_mm": view.displacement, "reaction_N_per_mm": view.load,
                         "elastic_energy": ledger.elastic, "gamma_min": float(state.gamma.min()), "sink": ledger.sink,
-                        "work": ledger.work, "loading_balance": ledger.balance, **beginning(view.scene, state),
+                        "work": ledger.work, "pressure_work": ledger.pressure_work,
+                        "loading_balance": ledger.balance, **beginning(view.scene, state),
                         "ratio": ratio, "place_of_ratio": place.tolist()}
         check_beginning(view.scene, state)

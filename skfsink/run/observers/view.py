@@ -80,7 +80,7 @@ class View:
     @property
     def load(self) -> float:
         """The load [N; N/mm in 2D]."""
-        return self.gauge.load(self.reaction)
+        return self.gauge.load(self.reaction, self.state.u)
 
     @property
     def displacement(self) -> float:

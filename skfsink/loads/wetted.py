@@ -1,0 +1,123 @@
+"""The surface on which pressures act: boundaries where their elements bear force, and the lips of cracks from them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from ..errors import MeshError, ParameterError
+from ..fem.space import Space
+from ..fem.surface import Facets, boundary_facets, facets_of
+
+__all__ = ["WettedSurface"]
+
+
+class WettedSurface:
+    """Facets that several loads act on.
+
+    Memory: the facets, and `area` of them, are of the density last given to `keep`.
+
+    Parameters
+    ----------
+    space: the mesh.
+    boundaries: of each load, name and nodes; it acts on the facets of the surface that have all their nodes in it.
+    cracks: numbers of the loads that act in the cracks from their boundary as well.
+
+    Attributes
+    ----------
+    boundary, boundary_owner: facets of the undamaged boundaries, and the load of each, (b,).
+    bears: those of them that bear load now, (b,).
+    facets, owner: all that bear load now, and the load of each, (f,).
+    nodes, corner, X: nodes of these facets, (k,), the facets by their places among these, and their positions.
+
+    Raises
+    ------
+    MeshError
+        The mesh has no facet on a boundary.
+    ParameterError
+        Two loads act on one facet.
+    """
+
+    def __init__(self, space: Space, boundaries: Sequence[tuple[str, np.ndarray]], cracks: Sequence[int]) -> None:
+        self.space, self._cracks = space, tuple(cracks)
+        numbers = []
+        for name, nodes in boundaries:
+            found = boundary_facets(space, nodes)
+            if not found.size:
+                raise MeshError(f"no pressure can act on boundary {name!r}: no facet of the surface has all its nodes "
+                                f"in it; it must be on the surface, and have all nodes of a side")
+            numbers.append(found)
+        everywhere = np.concatenate(numbers)
+        self.boundary_owner = np.repeat(np.arange(len(numbers)), [found.size for found in numbers])
+        places, first = np.unique(everywhere, return_index=True)
+        if places.size < everywhere.size:
+            again = np.setdiff1d(np.arange(everywhere.size), first)[0]
+            both = self.boundary_owner[everywhere == everywhere[again]]
+            names = " and ".join(repr(boundaries[k][0]) for k in both[:2])
+            raise ParameterError(f"two pressures act on one side of an element, of boundaries {names}: end one short "
+                                 f"of the other")
+        self.boundary = facets_of(space, everywhere)
+        self.bears = np.ones(everywhere.size, bool)
+        self._gone = np.zeros(0, np.int64)  # elements without force, at the last `keep`
+        self._take(self.boundary, self.boundary_owner)
+
+    def keep(self, gamma: np.ndarray, deleted: np.ndarray, floor: float) -> bool:
+        """Let loads act where elements bear force; returns whether these are others than before.
+
+        Elements do not that are `deleted` (ne,), or have the nodal density `gamma` (n,) below `floor` at all their
+        Gauss points.
+        """
+        conn, N = self.space.conn, self.space.N
+        near = np.union1d(self._at(np.flatnonzero(gamma < floor)), np.flatnonzero(deleted))
+        gone = near[deleted[near] | (gamma[conn[near]] @ N.T < floor).all(axis=1)]
+        if np.array_equal(gone, self._gone):
+            return False
+        self._gone = gone
+        mask = np.zeros(self.space.n_elements, bool)
+        mask[gone] = True
+        self.bears = ~mask[self.boundary.elements]
+        parts, owners = [self.boundary.some(self.bears)], [self.boundary_owner[self.bears]]
+        for k in self._cracks:
+            parts.append(self._lips(mask, self.boundary.elements[self.boundary_owner == k]))
+            owners.append(np.full(parts[-1].elements.size, k))
+        self._take(Facets.joined(parts), np.concatenate(owners))
+        return True
+
+    def _at(self, nodes: np.ndarray) -> np.ndarray:
+        """Elements at some nodes, (k,)."""
+        start, entry = self.space.incidence
+        first, count = start[nodes], start[nodes + 1] - start[nodes]
+        places = np.repeat(first - np.cumsum(count) + count, count) + np.arange(count.sum())
+        elements: np.ndarray = entry[places] // self.space.conn.shape[1]
+        return elements
+
+    def _take(self, facets: Facets, owner: np.ndarray) -> None:
+        self.facets, self.owner = facets, owner
+        self.nodes, corner = np.unique(facets.nodes, return_inverse=True)
+        self.corner = corner.reshape(facets.nodes.shape)
+        self.X = self.space.X[self.nodes]
+
+    def _lips(self, gone: np.ndarray, at: np.ndarray) -> Facets:
+        """Sides of elements that bear force, towards elements that are `gone` and joined by sides to some `at` (k,)."""
+        mesh = self.space.mesh
+        inner = np.flatnonzero(mesh.f2t[1] >= 0)
+        one, other = mesh.f2t[:, inner]
+        both = gone[one] & gone[other]
+        graph = coo_array((np.ones(int(both.sum()), bool), (one[both], other[both])), shape=(gone.size,) * 2)
+        _, label = connected_components(graph, directed=False)
+        reached = gone & np.isin(label, label[at[gone[at]]])
+        return Facets.joined([facets_of(self.space, inner[reached[out] & ~gone[here]], side)
+                              for side, (here, out) in enumerate(((one, other), (other, one)))])
+
+    def area(self, u: np.ndarray) -> np.ndarray:
+        """Areas of the facets, deformed by `u` (n, dim), (f,) [mm^2; mm in 2D]."""
+        x = (self.space.X + u)[self.facets.nodes]
+        if self.space.dim == 2:
+            length: np.ndarray = np.linalg.norm(x[:, 1] - x[:, 0], axis=1)
+            return length
+        one, two = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), np.cross(x[:, 2] - x[:, 3], x[:, 1] - x[:, 3])
+        area: np.ndarray = 0.5 * (np.linalg.norm(one, axis=1) + np.linalg.norm(two, axis=1))
+        return area
