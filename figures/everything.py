@@ -66,6 +66,8 @@ STEPS: dict[str, Step] = {step.name: step for step in (
     Step("ensemble", ("-m", "skfsink", "sweep", "cases/single_edge_notch/ensemble/scene.toml", "--vary",
                       "mesh.seed=1..50", "--out", "results/study/ensemble"), 1.0, "results/study/ensemble",
          {file: f"cases/single_edge_notch/ensemble/{file}" for file in ("sweep.csv", "sweep.png")}, jobs=True),
+    Step("release_rate", ("figures/release_rate.py",), 0.1, "results/release_rate",
+         {"release.png": "docs/images/release_rate.png"}),
     Step("pages", ("docs/make/scenes.py",), 0.01),
 )}
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .space import Space
+from .space import Space, node_key
 
 __all__ = ["Corner", "alternation", "corner_near", "element_pressure", "greatest_stretch", "inverted", "mean_density",
            "size_near", "turning", "turnings"]
@@ -45,7 +45,7 @@ def turnings(space: Space) -> tuple[np.ndarray, np.ndarray]:
     """
     dim, conn = space.dim, space.conn
     corners = np.arange(2**dim)
-    outer = _outer(space)                                  # (ne, 2 dim): whether face 2 axis + side is on the surface
+    outer = space.outer_faces                              # (ne, 2 dim): whether face 2 axis + side is on the surface
     keys, angles, on_surface = [], [], []
     for along in range(dim) if dim == 3 else [-1]:
         i, j = (axis for axis in range(dim) if axis != along)
@@ -60,7 +60,7 @@ def turnings(space: Space) -> tuple[np.ndarray, np.ndarray]:
             lengths = np.linalg.norm(arms[0], axis=1) * np.linalg.norm(arms[1], axis=1)
             cosine = np.einsum("ei,ei->e", *arms) / lengths
             angles.append(np.arccos(np.clip(cosine, -1.0, 1.0)))
-            keys.append(_key(conn[:, ends], space.n_nodes))
+            keys.append(node_key(conn[:, ends], space.n_nodes))
             on_surface.append(outer[:, 2 * i + (a >> i & 1)] | outer[:, 2 * j + (a >> j & 1)])
     places, where = np.unique(np.concatenate(keys), return_inverse=True)
     around = np.bincount(where, np.concatenate(angles), len(places))
@@ -93,23 +93,6 @@ def corner_near(space: Space, element: int) -> Corner | None:
     thickness = space.V[space.mesh.f2t[0, facets[beside]]] / (lengths * breadth)
     return Corner(float(angles[worst]), place, float(lengths.mean() / np.radians(angles[worst])),
                   float(thickness.mean()))
-
-
-def _key(nodes: np.ndarray, n: int) -> np.ndarray:
-    """One number for each row of nodes (m, 1 to 4), whatever their order; three nodes tell the faces of hexahedra."""
-    ordered = np.sort(nodes, axis=1)[:, :3]
-    key: np.ndarray = ordered @ (n ** np.arange(ordered.shape[1] - 1, -1, -1, dtype=np.int64))
-    return key
-
-
-def _outer(space: Space) -> np.ndarray:
-    """Mask (ne, 2 dim) of the faces (in 2D: sides) that belong to one element only, numbered 2 axis + side."""
-    corners = np.arange(2**space.dim)
-    faces = np.stack([_key(space.conn[:, corners[(corners >> axis & 1) == side]], space.n_nodes)
-                      for axis in range(space.dim) for side in range(2)], axis=1)
-    _, index, count = np.unique(faces, return_inverse=True, return_counts=True)
-    mask: np.ndarray = (count == 1)[index].reshape(faces.shape)
-    return mask
 
 
 def size_near(space: Space, node: int, radius: float) -> float:

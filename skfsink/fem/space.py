@@ -24,7 +24,7 @@ from ..errors import MeshError
 from ..system.jit import njit
 from .quadrature import AXES, points, shape_functions
 
-__all__ = ["Space"]
+__all__ = ["Space", "node_key"]
 
 _ELEMENTS = {"quad": skfem.ElementQuad1, "hex": skfem.ElementHex1}
 
@@ -183,6 +183,20 @@ class Space:
         return start, entry
 
     @cached_property
+    def outer_faces(self) -> np.ndarray:
+        """Mask (ne, 2 dim) of the faces (in 2D: sides) that belong to one element only, numbered 2 axis + side."""
+        faces = np.stack([node_key(self.conn[:, corners], self.n_nodes) for corners in self.face_corners], axis=1)
+        _, index, count = np.unique(faces, return_inverse=True, return_counts=True)
+        mask: np.ndarray = (count == 1)[index].reshape(faces.shape)
+        return mask
+
+    @property
+    def face_corners(self) -> np.ndarray:
+        """Local nodes of these faces, (2 dim, na/2)."""
+        corners = np.arange(2**self.dim)
+        return np.array([corners[(corners >> axis & 1) == side] for axis in range(self.dim) for side in range(2)])
+
+    @cached_property
     def graph(self) -> csr_array:
         """Node adjacency: nodes that share an element, symmetric with a full diagonal, (n, n)."""
         na = self.conn.shape[1]
@@ -191,6 +205,13 @@ class Space:
         graph.sum_duplicates()
         graph.data[:] = 1
         return graph
+
+
+def node_key(nodes: np.ndarray, n: int) -> np.ndarray:
+    """One number for each row of nodes (m, 1 to 4) out of n, in any order; three nodes tell the faces of hexahedra."""
+    ordered = np.sort(nodes, axis=1)[:, :3]
+    key: np.ndarray = ordered @ (n ** np.arange(ordered.shape[1] - 1, -1, -1, dtype=np.int64))
+    return key
 
 
 @njit(cache=True)

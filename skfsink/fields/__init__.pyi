@@ -1,10 +1,14 @@
 from .body import Body as Body
+from .configurational import configurational_forces as configurational_forces
 from .crack import CrackTracker as CrackTracker
 from .crack import Tips as Tips
 from .density import Density as Density
 from .density import DensitySolver as DensitySolver
 from .energy import Ledger as Ledger
 from .momentum import Momentum as Momentum
+from .release_rate import ReleaseRate as ReleaseRate
+from .release_rate import energy_release_rate as energy_release_rate
+from .release_rate import stress_intensity as stress_intensity
 from .state import State as State
 from .stress import cauchy_stress as cauchy_stress
 from .stress import pressure as pressure

@@ -51,6 +51,7 @@ class Tips:
     position: of the leading tip [mm], (dim,); NaN while nothing is cracked.
     length: crack length [mm].   speed: of the leading tip [m/s].
     branches: number of ends.   active: ends that still advance.   points: all tips (branches, dim).
+    nodes: where they are, (branches,).
     """
 
     position: np.ndarray
@@ -59,6 +60,7 @@ class Tips:
     branches: int
     active: int
     points: np.ndarray
+    nodes: np.ndarray
 
 
 class Plane(NamedTuple):
@@ -71,8 +73,8 @@ class Plane(NamedTuple):
 class CrackTracker:
     """Follows the crack through the nodal density, one call a record.
 
-    Memory: when each node cracked, the origins and the records so far; `mark`, `look`, `nothing`, `mean_speed` and
-    `memory` tell of the crack up to now. Times must not go back.
+    Memory: when each node cracked, the origins and the records so far; `mark`, `look`, `nothing`, `mean_speed`,
+    `advances`, `backwards` and `memory` tell of the crack up to now. Times must not go back.
 
     Parameters
     ----------
@@ -148,7 +150,7 @@ class CrackTracker:
         dim = self.space.dim
         if nodes.size == 0:
             self.track.append((time, 0.0))
-            return Tips(np.full(dim, np.nan), 0.0, 0.0, 0, 0, np.empty((0, dim)))
+            return Tips(np.full(dim, np.nan), 0.0, 0.0, 0, 0, np.empty((0, dim)), nodes)
         graph = self._graph[nodes][:, nodes]
         self._find_origins(nodes, graph)
         owner = self.origin[nodes]
@@ -162,14 +164,30 @@ class CrackTracker:
         tips = np.array([X[e] for e in ends])
         lengths = np.array([np.linalg.norm(X[e] - middles[root[e]]) for e in ends])
         lead = int(np.argmax(lengths))
-        age = time - self.cracked_at[nodes[ends]]
         self.track.append((time, float(lengths[lead])))
         self.max_branches = max(self.max_branches, len(ends))
         if self.arrival is not None and np.isnan(self.arrival_length):
             self.arrival_length = float(lengths[lead])
         self.separated = self.separated or self._apart(gamma)
         return Tips(tips[lead], float(lengths[lead]), self._speed(), len(ends),
-                    int((age < (ADVANCES if self._transit is None else 5 * self._transit)).sum()), tips)
+                    int(self.advances(time, nodes[ends]).sum()), tips, nodes[ends])
+
+    def advances(self, time: float, nodes: np.ndarray) -> np.ndarray:
+        """Mask of the tips at `nodes` (m,) that still advance."""
+        mask: np.ndarray = time - self.cracked_at[nodes] < (ADVANCES if self._transit is None else 5 * self._transit)
+        return mask
+
+    def backwards(self, node: int, within: float) -> np.ndarray | None:
+        """Unit vector (dim,) from the tip at a node back along its crack, as far as `within` [mm]; None if it has none.
+
+        It points to the mean of what cracked before, in the same ball.
+        """
+        X, at = self.space.X, self.cracked_at
+        way = X - X[node]
+        near = (np.einsum("ni,ni->n", way, way) <= within**2) & (at <= at[node])
+        back: np.ndarray = way[near].mean(axis=0)
+        length = float(np.linalg.norm(back))
+        return back / length if length > 0.1 * within else None
 
     def mean_speed(self) -> float | None:
         """Mean speed of the leading tip up to the first arrival, or to the last record before any [m/s]; None where

@@ -8,4 +8,5 @@ from .onset import Onset as Onset
 from .onset import Strength as Strength
 from .progress import Checkpoint as Checkpoint
 from .progress import Progress as Progress
+from .release import EnergyRelease as EnergyRelease
 from .view import View as View

@@ -1,0 +1,176 @@
+"""Energy-momentum (Eshelby) tensor and configurational forces of the element that the body is computed with.
+
+At fixed nodal displacements the potential of Sec. 4 of `docs/theory.md` depends on the undeformed places X_a of the
+nodes: with H = Grad u, and of weights, gradients, mean J and mean gamma of an element
+
+    dw = w N_a,K dX_aK,   dF_iJ = -u_i,K N_a,J dX_aK,   d(J_bar V) = w (J delta_KJ - cof F_iJ u_i,K) N_a,J dX_aK,
+
+    dPi/dX_aK = sum_q w S_KJ N_a,J,   S_KJ = [gamma W + p (J - J_bar)] delta_KJ - u_i,K P_iJ,
+
+with p = gamma_bar k (J_bar - 1).
+
+S is the energy-momentum tensor (Eshelby, J. Elasticity 5 (1975) 321-335), with the stress P of the element. The term of
+J - J_bar comes with the element constant J_bar; it vanishes with the size of the elements, and there is none in the
+elements "plain" and "planestress".
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..material import GeneralMaterial, Material
+from ..material.crushed import J_FLOOR, crushed
+from .momentum import Momentum, Part
+
+__all__ = ["PointStress", "configurational_forces", "effective_density", "point_stress"]
+
+
+class PointStress(NamedTuple):
+    """Energy and stress at the Gauss points of some elements, weighted by gamma.
+
+    Attributes
+    ----------
+    energy: gamma W [MPa], (m, nq).   excess: p (J - J_bar) [MPa], (m, nq).
+    P: first Piola-Kirchhoff stress of the body's dimension [MPa], (m, nq, dim, dim).   H: Grad u, of the same shape.
+    """
+
+    energy: np.ndarray
+    excess: np.ndarray
+    P: np.ndarray
+    H: np.ndarray
+
+    @property
+    def tensor(self) -> np.ndarray:
+        """The energy-momentum tensor S_KJ [MPa], (m, nq, dim, dim)."""
+        S = -np.swapaxes(self.H, -1, -2) @ self.P
+        diagonal = np.arange(S.shape[-1])
+        S[..., diagonal, diagonal] += (self.energy + self.excess)[..., None]
+        return np.asarray(S)
+
+
+def effective_density(momentum: Momentum, gamma: np.ndarray, deleted: np.ndarray, elements: np.ndarray) -> np.ndarray:
+    """Relative density that the force sees at the Gauss points of `elements` (m,), (m, nq), of nodal `gamma` (n,)."""
+    at_gauss = gamma[momentum.space.conn[elements]] @ momentum.space.N.T
+    at_gauss[(at_gauss < momentum.force_floor) | deleted[elements, None]] = 0.0
+    return np.asarray(at_gauss)
+
+
+def configurational_forces(momentum: Momentum, u: np.ndarray) -> np.ndarray:
+    """Derivative of the stored energy with the undeformed places of the nodes, at fixed displacements of these.
+
+    `u` is the displacement (n, dim) [mm]; the relative density is the one that `momentum` has, and goes with its Gauss
+    points. The result is (n, dim) [N; N/mm in 2D]. In equilibrium it vanishes, but for the error of the mesh, at
+    nodes inside of a homogeneous body; at the tip of a crack its sum over a domain is -G in the direction of the crack
+    (:mod:`.release_rate`). Dead loads and contact have no part in it.
+    """
+    space = momentum.space
+    elements = np.arange(space.n_elements)
+    S = point_stress(momentum, u, elements, momentum.gamma).tensor
+    local = np.einsum("eq,eqKJ,eqaJ->eaK", space.w, S, space.dN)
+    out = np.zeros_like(space.X)
+    for i in range(space.dim):
+        out[:, i] = np.bincount(space.conn.ravel(), local[..., i].ravel(), space.n_nodes)
+    return out
+
+
+def point_stress(momentum: Momentum, u: np.ndarray, elements: np.ndarray, gamma: np.ndarray) -> PointStress:
+    """Energy and stress of `elements` (m,) at the displacement `u` (n, dim), for the density `gamma` (m, nq)."""
+    space, dim = momentum.space, momentum.space.dim
+    H = np.swapaxes(u[space.conn[elements]], 1, 2)[:, None] @ space.dN[elements]
+    found = PointStress(np.zeros_like(gamma), np.zeros_like(gamma), np.zeros_like(H), H)
+    for part, rows in parts_of(momentum, elements):
+        F = np.zeros((len(rows), gamma.shape[1], 3, 3))
+        F[...] = np.eye(3)
+        F[..., :dim, :dim] += H[rows]
+        W, P, excess = _of_part(momentum, part, elements[rows], F, gamma[rows])
+        found.energy[rows], found.excess[rows], found.P[rows] = gamma[rows] * W, excess, P[..., :dim, :dim]
+    return found
+
+
+def parts_of(momentum: Momentum, elements: np.ndarray) -> list[tuple[Part, np.ndarray]]:
+    """The parts that `elements` (m,) are of, each with the numbers of its ones among the m."""
+    found = []
+    for part in momentum.parts:
+        rows = np.arange(elements.size) if part.elements is None else np.flatnonzero(np.isin(elements, part.elements))
+        if rows.size:
+            found.append((part, rows))
+    return found
+
+
+def fibres_at(part: Part, elements: np.ndarray) -> np.ndarray | None:
+    """Directions (m, families, 3) of the fibres in `elements` (m,) of a part; None if it has none."""
+    if part.fibres is None:
+        return None
+    return part.fibres[elements if part.elements is None else np.searchsorted(part.elements, elements)]
+
+
+def _of_part(momentum: Momentum, part: Part, elements: np.ndarray, F: np.ndarray,
+             gamma: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """W of the undamaged material, P weighted by gamma, and p (J - J_bar), of elements of one part."""
+    material, w = part.material, momentum.space.w[elements]
+    if momentum.plane_stress:
+        return _of_sheet(material, F, gamma)
+    cof = _cofactor(F)
+    J = np.einsum("...J,...J", F[..., 0, :], cof[..., 0, :])
+    k, J_bar, gamma_bar = material.bulk_modulus, J, gamma
+    if momentum.element == "jbar":
+        J_bar, gamma_bar = ((w * a).sum(axis=1, keepdims=True) / w.sum(axis=1, keepdims=True) for a in (J, gamma))
+    p = gamma_bar * k * (J_bar - 1)
+    F = np.where((gamma > 0)[..., None, None], F, np.eye(3))  # a dead point may have any shape
+    if isinstance(material, GeneralMaterial):
+        fibres = fibres_at(part, elements)
+        fibres = None if fibres is None else fibres[:, None]
+        psi = material.isochoric_energy(F, J_FLOOR, fibres)
+        P = material.isochoric_stress(F, J_FLOOR, fibres)
+    else:
+        floored, s, J_e = crushed(np.where(gamma > 0, J, 1.0))
+        R, tr_C = floored ** (-2 / 3) * s, np.einsum("...iJ,...iJ", F, F)
+        psi, slope, _ = material.isochoric(R * tr_C)
+        P = (slope * R)[..., None, None] * (2 * F - (2 / 3 * tr_C / J_e)[..., None, None] * cof)
+    W = psi + 0.5 * k * (J_bar - 1) ** 2
+    P = gamma[..., None, None] * P + p[..., None, None] * cof
+    return W, P, p * (J - J_bar)
+
+
+def _of_sheet(material: Material, F: np.ndarray, gamma: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The same of a thin sheet without stress across it; J below the floor is read as that (Sec. 4.1)."""
+    F = np.where((gamma > 0)[..., None, None], F, np.eye(3))
+    plane = F[..., :2, :2]
+    j = np.maximum(plane[..., 0, 0] * plane[..., 1, 1] - plane[..., 0, 1] * plane[..., 1, 0], J_FLOOR)
+    t = np.einsum("...iJ,...iJ", plane, plane)
+    across = _across(material, t, j)
+    J = j * across
+    psi, slope, _ = material.isochoric(J ** (-2 / 3) * (t + across**2))
+    cof = _cofactor(F)
+    P = (2 * gamma * slope * J ** (-2 / 3))[..., None, None] * (F - (across**2 / j)[..., None, None] * cof)
+    return psi + 0.5 * material.bulk_modulus * (J - 1) ** 2, P, np.zeros_like(gamma)
+
+
+def _across(material: Material, t: np.ndarray, j: np.ndarray) -> np.ndarray:
+    """:meth:`.Material.stretch_across` by Newton's method for log J^(1/3) (Sec. 4.1), which is faster."""
+    y, k = np.ones_like(j), material.bulk_modulus
+    for _ in range(60):
+        J, p, s = y**3, t / y**2, (y * y / j) ** 2
+        _, slope, curve = material.isochoric(p + s)
+        lean = 4 * s - 2 * p
+        gradient = slope * lean + 3 * k * J * (J - 1)
+        isochoric = curve * lean**2 + slope * (16 * s + 4 * p)
+        stiff = np.maximum(isochoric + 3 * k * J * (6 * J - 3), 0.1 * (isochoric + 9 * k * J * J))
+        step = np.clip(-gradient / stiff, -0.2, 0.2)
+        y *= np.exp(step)
+        if np.abs(step).max(initial=0.0) < 1e-9:
+            return np.asarray(y**3 / j)
+    return material.stretch_across(t, j)
+
+
+def _cofactor(F: np.ndarray) -> np.ndarray:
+    """cof F of matrices (..., 3, 3), also where F is singular."""
+    out = np.empty_like(F)
+    for i in range(3):
+        b, c = (i + 1) % 3, (i + 2) % 3
+        for k in range(3):
+            m, n = (k + 1) % 3, (k + 2) % 3
+            out[..., i, k] = F[..., b, m] * F[..., c, n] - F[..., b, n] * F[..., c, m]
+    return out
