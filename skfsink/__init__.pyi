@@ -18,7 +18,14 @@ from .pictures.film import still as still
 from .report.page import write_report as write_report
 from .results.loader import load as load
 from .results.result import Result as Result
+from .run.observers.fragments import Fragments as Fragments
 from .run.observers.observer import Observer as Observer
+from .run.observers.probe import LineProbe as LineProbe
+from .run.observers.probe import MeanProbe as MeanProbe
+from .run.observers.probe import PointProbe as PointProbe
+from .run.observers.probe_surfaces import OpeningProbe as OpeningProbe
+from .run.observers.probe_surfaces import ReactionProbe as ReactionProbe
+from .run.observers.probe_surfaces import VolumeProbe as VolumeProbe
 from .scene.deck import read_deck as read_deck
 from .scene.options import Options as Options
 from .system.shipped import data_folder as data_folder

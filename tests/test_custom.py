@@ -32,7 +32,7 @@ from skfsink.meshing.vtu import write_mesh
 from skfsink.results.loader import load
 from skfsink.scene.deck import read_deck
 from skfsink.scene.options import Options
-from skfsink.scene.stored import StoredScene
+from skfsink.scene.stored import TABLES, StoredScene
 from skfsink.scene.tables import grips_of, read_tables, regions_of
 
 HEAD = 'case = "custom"\n[parameters]\nmesh = "plate.vtu"\nlength_scale = 0.6\nevent_time = "5 µs"\n'
@@ -225,7 +225,7 @@ def test_tables_keep_what_they_say(tmp_path: Path) -> None:
     assert read_tables("tractions", [{"boundary": "a", "y": "10 kPa/s"}]) == ({"boundary": "a", "y": 0.01},)
     region = {"name": "core", "material": "gent", "constants": "mu = 1 MPa", "phi": "500 kPa", "density": "1 g/cm^3"}
     assert read_tables("regions", [region]) == (region | {"phi": 0.5, "density": 1000.0},)
-    parameters = {"mesh": "a.vtu", "grips": grips, "tractions": (), "pressures": (), "fillings": (), "regions": ()}
+    parameters = {"mesh": "a.vtu", **dict.fromkeys(TABLES, ()), "grips": grips}
     StoredScene("custom", parameters).write(tmp_path)
     assert StoredScene.read(tmp_path) == StoredScene("custom", {**parameters, "grips": list(grips)})
 

@@ -19,10 +19,10 @@ from skfem.io.meshio import from_meshio
 
 from skfsink.cases.custom import custom
 from skfsink.errors import MeshError, ParameterError
+from skfsink.fem.facets import boundary_facets
 from skfsink.fem.forms import pressure_forms
 from skfsink.fem.pattern import Pattern
 from skfsink.fem.space import Space
-from skfsink.fem.surface import boundary_facets
 from skfsink.fields.body import Body
 from skfsink.fields.density import DensitySolver
 from skfsink.fields.momentum import Momentum

@@ -299,7 +299,7 @@ def test_terms_of_the_ledger_are_shown_where_the_run_has_them(folder: Path, copy
     assert found[0][meaning] == ("0", "0", "0") and meaning not in found[1] and found[2][meaning] == ("–", "0")
     labels = []
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(plot, "_save", lambda figure, *_: labels.append(figure.axes[0].get_legend_handles_labels()[1]))
+        patch.setattr(plot, "save", lambda figure, *_: labels.append(figure.axes[0].get_legend_handles_labels()[1]))
         for of in (plain, run):
             plot.ledger_picture(of.history, "")
     assert set(labels[1]) - set(labels[0]) == {plot.BANDS[term][0]}

@@ -19,7 +19,7 @@ from ..run.request import check_options
 from ..scene.case import Case
 from ..scene.options import SAMPLE, Options
 from ..scene.scene import Scene
-from ..scene.tables import grips_of, pressures_of, read_tables, regions_of, tractions_of
+from ..scene.tables import cracks_of, grips_of, pressures_of, read_tables, regions_of, tractions_of
 from ..units import Unit
 
 __all__ = ["custom"]
@@ -38,6 +38,8 @@ def custom(
         pressures: Annotated[Sequence[Pressure | Mapping[str, Any]], IN_A_DECK] = (),
         fillings: Annotated[Sequence[Filling | Mapping[str, Any]], IN_A_DECK] = (),
         regions: Annotated[Sequence[RegionLaw | Mapping[str, Any]], IN_A_DECK] = (),
+        probes: Annotated[Sequence[Mapping[str, Any]], IN_A_DECK] = (),
+        cracks: Annotated[Sequence[Mapping[str, Any]], IN_A_DECK] = (),
         options: Options = Options(),  # noqa: B008
 ) -> Result:
     """Load a body of one's own until it fails, and watch the crack.
@@ -70,6 +72,11 @@ def custom(
         pressure, of fluid and pump. A plane body counts as 1 mm thick.
     regions
         Named sets of elements that are of another material, or of another strength.
+    probes
+        What is followed through the run, each into a file of its own: quantities at points, along lines and over
+        surfaces, forces on boundaries, enclosed volumes, openings.
+    cracks
+        Cracks that the mesh has not: elements along a line, in a surface or of a named set, broken from the start.
     options
         Material, analysis and controls; see :class:`~skfsink.scene.options.Options`. `speed` is for the other cases.
 
@@ -86,7 +93,8 @@ def custom(
     arguments = {"mesh": mesh, "title": title, "faces": faces, "merge_nodes": merge_nodes,
                  "grips": read_tables("grips", grips), "tractions": read_tables("tractions", tractions),
                  "pressures": read_tables("pressures", pressures), "fillings": read_tables("fillings", fillings),
-                 "regions": read_tables("regions", regions)}
+                 "regions": read_tables("regions", regions), "probes": read_tables("probes", probes),
+                 "cracks": read_tables("cracks", cracks)}
     return run_case(CASE, arguments, options)
 
 
@@ -112,7 +120,8 @@ def _scene(arguments: dict[str, Any], options: Options) -> Scene:
         case="custom", title=arguments["title"], parameters={**arguments, **options.parameters()}, sample=sample,
         material=material, sink_law=sink_law, controls=options.controls(), regions=regions,
         grips=grips_of(arguments["grips"], dim),
-        tractions=tractions_of(arguments["tractions"], dim), pressures=pressures,
+        tractions=tractions_of(arguments["tractions"], dim), pressures=pressures, probes=tuple(arguments["probes"]),
+        cracks=cracks_of(arguments["cracks"], sample),
         faces=tuple(filter(None, (name.strip() for name in arguments["faces"].split(",")))))
 
 

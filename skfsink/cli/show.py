@@ -21,6 +21,13 @@ EXAMPLES = {
                  'compliance = "0.1 mm^3/kPa"'),
     "regions": ('[[regions]]', 'name = "inclusion"', 'material = "neo-hookean"', 'constants = "mu = 2 MPa"',
                 'phi = "1 MPa"          # also m, bulk_modulus, density'),
+    "cracks": ('[[cracks]]', 'name = "slit"',
+               'points = [["0 mm", "2 mm"], ["1 mm", "2 mm"]]   # or elements = "a set"',
+               'lips = "broken"         # as of a crack that has run, or "whole" as of a cut',
+               'width = "0.1 mm"        # left out: as narrow as the mesh allows'),
+    "probes": ('[[probes]]', 'name = "tip"', 'kind = "point"          # or line, mean, reaction, volume, opening',
+               'position = ["1 mm", "2 mm"]', 'quantity = "stress, gamma"', '[[probes]]', 'name = "forces"',
+               'kind = "reaction"       # on all grips', 'every = "1 us"'),
 }
 
 

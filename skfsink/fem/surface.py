@@ -1,60 +1,164 @@
-"""Facets of elements, with their nodes in the order that puts the normal outside of the element."""
+"""The surface of a body at a named boundary: its facets, means over it, and the volume that it encloses."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple
-
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
+from ..errors import MeshError, ParameterError, place_text
+from .places import Places
+from .quadrature import points, shape_functions
 from .space import Space
 
-__all__ = ["FACETS", "Facets", "boundary_facets", "facets_of"]
+__all__ = ["Surface"]
 
-#: Local nodes of the facets of an element. In the plane the normal of the edge from a to b is (dy, -dx); in space the
-#: nodes are at (0, 0), (1, 0), (0, 1) and (1, 1) of (s, t), and the normal is x,s × x,t.
-FACETS = {2: np.array([[2, 0], [1, 3], [0, 1], [3, 2]]),
-          3: np.array([[0, 4, 2, 6], [1, 3, 5, 7], [0, 1, 4, 5], [2, 6, 3, 7], [0, 2, 1, 3], [4, 5, 6, 7]])}
+FLAT = 1e-6   # of its size: how far a rim may be from its plane
+_QUAD = (0, 1, 3, 2)  # corners of the unit square on the way round
 
 
-class Facets(NamedTuple):
-    """Some facets, f of them, each of one element.
+class Surface:
+    """Facets of the surface of a body all of whose nodes belong to a boundary.
+
+    Parameters
+    ----------
+    space: the mesh.
+    name: of the boundary, for messages.
+    nodes: of the boundary.
 
     Attributes
     ----------
-    elements: to which they belong, (f,).
-    local: their nodes by the numbers in the element, (f, k), k = 2 in the plane and 4 in space.
-    nodes: the same by the numbers in the mesh, (f, k).
+    facets: nodes of the facets on their way round, (nf, 2) or (nf, 4): in the plane the body is on the left of them, in
+        space they turn to the left about the normal that points out of the body.
+    elements: of the facets, (nf,).
+
+    Raises
+    ------
+    MeshError
+        No facet of the surface has all its nodes in the boundary.
     """
 
-    elements: np.ndarray
-    local: np.ndarray
-    nodes: np.ndarray
+    def __init__(self, space: Space, name: str, nodes: np.ndarray) -> None:
+        self.space, self.name = space, name
+        member = np.zeros(space.n_nodes, bool)
+        member[nodes] = True
+        facets, elements, sides = [], [], []
+        outer = {tuple(facet) for facet in np.sort(space.mesh.facets[:, space.mesh.boundary_facets()], axis=0).T}
+        for side, corners in enumerate(_sides(space.dim)):
+            found = space.conn[:, corners]
+            hits = np.flatnonzero(member[found].all(axis=1))
+            hits = hits[[tuple(sorted(facet)) in outer for facet in found[hits].tolist()]] if hits.size else hits
+            facets.append(found[hits])
+            elements.append(hits)
+            sides.append(np.full(hits.size, side))
+        self.facets, self.elements = np.concatenate(facets), np.concatenate(elements)
+        self._sides = np.concatenate(sides)
+        if not self.elements.size:
+            raise MeshError(f"boundary {name!r} is no surface: no facet of the surface of the body has all its nodes "
+                            f"in it; name all nodes of a side")
 
-    def some(self, mask: np.ndarray) -> Facets:
-        """Those where a `mask` (f,) is true."""
-        return Facets(self.elements[mask], self.local[mask], self.nodes[mask])
+    # --- means ---
+    def places(self) -> tuple[Places, np.ndarray]:
+        """Points of integration on the facets, and their parts of the undeformed surface [mm^(dim-1)], (m,)."""
+        space, dim = self.space, self.space.dim
+        flat = points(dim - 1) if dim == 3 else np.array([[0.5 - 0.5 / np.sqrt(3)], [0.5 + 0.5 / np.sqrt(3)]])
+        elements, shape, weights = [], [], []
+        for side in np.unique(self._sides):
+            axis, upper = divmod(int(side), 2)
+            N, dN = shape_functions(np.insert(flat, axis, float(upper), axis=1))
+            of = self.elements[self._sides == side]
+            arms = np.einsum("eai,qak->eqik", space.X[space.conn[of]], np.delete(dN, axis, axis=2))
+            area = np.sqrt(np.linalg.det(np.swapaxes(arms, -1, -2) @ arms)) / len(flat)
+            elements.append(np.repeat(of, len(flat)))
+            shape.append(np.tile(N, (of.size, 1)))
+            weights.append(area.ravel())
+        return Places(np.concatenate(elements), np.concatenate(shape)), np.concatenate(weights)
 
-    @classmethod
-    def joined(cls, parts: Sequence[Facets]) -> Facets:
-        """All of several."""
-        return cls(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+    # --- the volume ---
+    def rims(self) -> list[np.ndarray]:
+        """Pieces of the rim, each the directed edges (m, 2) that facets have on one side alone; in the plane the pairs
+        (1, 2) of the last and the first node of each open line. None of a closed surface."""
+        if self.space.dim == 2:
+            return self._ends()
+        edges = np.concatenate([self.facets[:, [i, (i + 1) % 4]] for i in range(4)])
+        there = {(int(a), int(b)) for a, b in edges}
+        open_ = np.array([(a, b) for a, b in edges.tolist() if (b, a) not in there], int).reshape(-1, 2)
+        if not len(open_):
+            return []
+        used, index = np.unique(open_, return_inverse=True)
+        index = index.reshape(-1, 2)
+        graph = coo_array((np.ones(len(index)), index.T), shape=(used.size,) * 2)
+        _, piece = connected_components(graph, directed=False)
+        return [open_[piece[index[:, 0]] == k] for k in range(piece.max() + 1)]
+
+    def _ends(self) -> list[np.ndarray]:
+        following = dict(self.facets.tolist())
+        firsts = sorted(set(following) - set(following.values()))
+        found = []
+        for first in firsts:
+            last = first
+            while last in following:
+                last = following[last]
+            found.append(np.array([[last, first]]))
+        return found
+
+    def check_caps(self) -> None:
+        """Refuse a rim that no flat cap closes (ParameterError)."""
+        rims, X = self.rims(), self.space.X
+        cure = "give the position of a point to which straight lines from the rim close it"
+        if self.space.dim == 2 and len(rims) > 1:
+            raise ParameterError(f"the boundary {self.name!r} is {len(rims)} open lines, and it is not said how they "
+                                 f"enclose an area: {cure}")
+        for rim in rims if self.space.dim == 3 else []:
+            corners = X[np.unique(rim)]
+            centred = corners - corners.mean(axis=0)
+            height = np.linalg.svd(centred)[2][2] @ centred.T
+            if np.abs(height).max() > FLAT * np.abs(centred).max():
+                raise ParameterError(f"the rim of the boundary {self.name!r} around "
+                                     f"{place_text(corners.mean(axis=0))} mm is not in a plane, and no flat cap closes "
+                                     f"it: {cure}")
+
+    def volume(self, x: np.ndarray, apex: np.ndarray | None = None) -> float:
+        """(1/dim) int (x - apex) . n dA over the surface at the nodal positions `x` (n, dim) [mm^dim].
+
+        n points out of the body: the volume that a cavity encloses is the negative of it. Without an `apex` open rims
+        are closed by flat caps, in space by a fan of triangles to the mean of the rim's nodes; with an `apex` (dim,) by
+        straight lines to it, which add nothing.
+        """
+        centre = x[self.facets[0, 0]] if apex is None else apex
+        total = _flux(x[self.facets] - centre)
+        if apex is None:
+            for rim in self.rims():
+                corners = x[rim[:, ::-1] if self.space.dim == 3 else rim] - centre
+                if self.space.dim == 3:
+                    middle = (x[np.unique(rim)] - centre).mean(axis=0)
+                    total += float(np.einsum("ei,ei->", np.cross(corners[:, 0], corners[:, 1]),
+                                             np.broadcast_to(middle, corners[:, 0].shape))) / 6
+                else:
+                    total += _flux(corners)
+        return total
 
 
-def facets_of(space: Space, numbers: np.ndarray, side: np.ndarray | int = 0) -> Facets:
-    """Facets by the `numbers` (f,) they have in the mesh, each of its first or second element, `side` 0 or 1 (f,)."""
-    elements = space.mesh.f2t[np.broadcast_to(side, numbers.shape), numbers]
-    table = FACETS[space.dim]
-    of_element = space.conn[elements][:, table]
-    there = np.sort(space.mesh.facets[:, numbers].T, axis=1)
-    which = (np.sort(of_element, axis=2) == there[:, None]).all(axis=2).argmax(axis=1)
-    return Facets(elements, table[which], of_element[np.arange(numbers.size), which])
-
-
-def boundary_facets(space: Space, nodes: np.ndarray) -> np.ndarray:
-    """Numbers of the facets of the surface that have all their nodes among `nodes` (k,)."""
-    boundary: np.ndarray = space.mesh.boundary_facets()
-    inside = np.zeros(space.n_nodes, bool)
-    inside[nodes] = True
-    found: np.ndarray = boundary[inside[space.mesh.facets[:, boundary]].all(axis=0)]
+def _sides(dim: int) -> list[list[int]]:
+    """Corners of the sides 2 axis + side of an element on their way round, as :attr:`Surface.facets` has them."""
+    if dim == 2:
+        return [[2, 0], [1, 3], [0, 1], [3, 2]]
+    found = []
+    for axis in range(3):
+        i, j = 1 << (axis + 1) % 3, 1 << (axis + 2) % 3
+        for side in range(2):
+            way = [corner + (side << axis) for corner in (0, i, i + j, j)]
+            found.append(way if side else way[::-1])
     return found
+
+
+def _flux(corners: np.ndarray) -> float:
+    """(1/dim) int x . n dA over facets with corners (nf, 2 or 4, dim), those in space bilinear; it is exact."""
+    if corners.shape[1] == 2:
+        a, b = corners[:, 0], corners[:, 1]
+        return float((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum()) / 2
+    N, dN = shape_functions(points(2))
+    of = corners[:, _QUAD]  # lexicographic
+    x, arm = np.einsum("qa,eai->eqi", N, of), np.einsum("qak,eai->kqei", dN, of)
+    normal = np.swapaxes(np.cross(arm[0], arm[1]), 0, 1)
+    return float(np.einsum("eqi,eqi->", x, normal)) / (3 * len(N))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Protocol
 
@@ -16,6 +16,8 @@ from ..material import Material, SinkLaw
 from ..material.homogeneous import wave_speed_at_failure
 from ..material.regions import Region
 from .contact import Contact
+from .crack import CRACKED
+from .deletion import GONE
 from .density import DensitySolver
 from .momentum import BulkViscosity, Momentum
 from .state import State
@@ -90,6 +92,14 @@ class BodyScene(Protocol):
         """Elements of other materials."""
 
     @property
+    def broken(self) -> np.ndarray:
+        """Numbers of the elements of initial cracks."""
+
+    @property
+    def cut(self) -> np.ndarray:
+        """Those of cracks whose lips are whole."""
+
+    @property
     def controls(self) -> BodyControls:
         """Options."""
 
@@ -109,6 +119,7 @@ class Body:
     loading: what is held, moved and pulled at each load time.
     deletion: gamma at which an element fails.
     threads: that share factorisations and loops over elements.
+    broken: numbers of the elements that are broken from the start.
 
     Raises
     ------
@@ -121,6 +132,7 @@ class Body:
     loading: Loading
     deletion: float = 1e-6
     threads: int = 1
+    broken: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
 
     def __post_init__(self) -> None:
         if self.momentum.dead is not self.loading.dead:
@@ -142,8 +154,9 @@ class Body:
         if controls.contact:
             momentum.contact = Contact(space, momentum.parts, loading.free)
         density = DensitySolver(space, scene.sink_law, controls.sink, active_zone=controls.active_zone,
-                                regions=scene.regions, kernels=controls.kernels, gradient=controls.gradient)
-        return cls(momentum, density, loading, controls.deletion, threads)
+                                regions=scene.regions, kernels=controls.kernels, gradient=controls.gradient,
+                                absent=scene.cut)
+        return cls(momentum, density, loading, controls.deletion, threads, scene.broken)
 
     @property
     def space(self) -> Space:
@@ -170,6 +183,45 @@ class Body:
         """Greatest speed of :func:`.wave_speed_at_failure` among the materials [m/s]."""
         pairs = zip(self.momentum.parts, self.density.parts, strict=True)
         return max(wave_speed_at_failure(part.material, law) for part, (_, law) in pairs)
+
+    # --- initial cracks ---
+    def begin(self) -> State:
+        """The undeformed body at rest, intact but for initial cracks."""
+        state = State.intact(self.space)
+        if self.broken.size:
+            state.W_max[self.broken] = GONE * np.broadcast_to(self.density.phi, state.W_max.shape)[self.broken]
+            state.gamma = self._begun.copy()
+            state.deleted[self.broken] = True
+            state.deleted |= (self.space.at_gauss(state.gamma) <= self.deletion).all(axis=1)
+        return state
+
+    @cached_property
+    def _begun(self) -> np.ndarray:
+        """Density around initial cracks, (n,): the history of what has failed, and gamma with it."""
+        if self.density.absent.size == self.broken.size:  # all of them are cuts
+            return (self.density.load > 0.0).astype(float)
+        W_max = np.zeros_like(self.space.w)
+        W_max[self.broken] = GONE * np.broadcast_to(self.density.phi, W_max.shape)[self.broken]
+        return self.density.solve(W_max, np.ones(self.space.n_nodes))
+
+    @cached_property
+    def cracked(self) -> np.ndarray:
+        """Mask of the nodes that initial cracks have cracked, (n,)."""
+        return self._begun < CRACKED if self.broken.size else np.zeros(self.space.n_nodes, bool)
+
+    def kept(self, gamma: np.ndarray) -> np.ndarray:
+        """Share of the density at the beginning that is left at `gamma` (n,), and 1 in an initial crack."""
+        if not self.broken.size:
+            return gamma
+        return np.where(self.cracked, 1.0, gamma / np.where(self.cracked, 1.0, self._begun))
+
+    def since_begun(self, state: State) -> State:
+        """A state with the density that is :meth:`kept`, without history in initial cracks: what the body saw."""
+        if not self.broken.size:
+            return state
+        W_max = state.W_max.copy()
+        W_max[self.broken] = 0.0
+        return replace(state, gamma=self.kept(state.gamma), W_max=W_max)
 
     def take(self, state: State) -> np.ndarray:
         """Bring the momentum balance to load time, density and displacement of a state; its force less dead loads."""

@@ -83,12 +83,16 @@ class CrackTracker:
     grips: node numbers of each grip.
     rim: node numbers of the rim.
     planes: of symmetry.
+    before: mask of the nodes that are cracked from the start, (n,): they are no part of the crack, as if the mesh
+        lacked them, and the nodes beside them are of the rim.
+    gone: numbers of elements that the mesh has and the body has not; they join nothing, their nodes are of the rim.
     """
 
     _REMEMBERED = ("arrival_length", "max_branches", "separated")
 
     def __init__(self, space: Space, length_scale: float, shear_wave_speed: float | None, grips: list[np.ndarray],
-                 rim: np.ndarray, planes: Sequence[Plane] = ()) -> None:
+                 rim: np.ndarray, planes: Sequence[Plane] = (), before: np.ndarray | None = None,
+                 gone: np.ndarray | None = None) -> None:
         self.space, self.l = space, length_scale
         #: l/c_s [s]; None if the clock counts passes
         self._transit = None if shear_wave_speed is None else length_scale / (shear_wave_speed * 1e3)
@@ -97,6 +101,12 @@ class CrackTracker:
         lengths = np.linalg.norm(space.X[rows] - space.X[space.graph.indices], axis=1)
         self._graph = csr_array((np.maximum(lengths, 1e-12), space.graph.indices, space.graph.indptr),
                                 shape=space.graph.shape)
+        self._before = None
+        if before is not None and gone is not None and gone.size:
+            beside = self._graph @ before.astype(float) > 0.0
+            beside[space.conn[gone]] = True
+            self._before, self._rim = before, np.union1d(rim, np.flatnonzero(beside & ~before))
+            self._graph = _without(self._graph, space, gone)
         self.cracked_at = np.full(space.n_nodes, np.inf)   #: time at which each node cracked [s, or pass]
         self.origin = np.full(space.n_nodes, -1)           #: number of the origin a node belongs to, -1 for none
         self.track: list[tuple[float, float]] = []         #: (time, crack length) of the records
@@ -109,6 +119,8 @@ class CrackTracker:
     def mark(self, time: float, gamma: np.ndarray) -> bool:
         """Note nodes that cracked since the last call; True if that makes the first arrival."""
         new = (gamma < CRACKED) & np.isinf(self.cracked_at)
+        if self._before is not None:
+            new &= ~self._before
         if not new.any():
             return False
         self.cracked_at[new] = time
@@ -293,3 +305,12 @@ class CrackTracker:
         self.arrival = None if np.isnan(arrival) else arrival
         for name in self._REMEMBERED:
             setattr(self, name, memory[name].item())
+
+
+def _without(graph: csr_array, space: Space, gone: np.ndarray) -> csr_array:
+    """A graph of the nodes without the edges that only the elements `gone` have."""
+    conn = np.delete(space.conn, gone, axis=0)
+    rows, columns = np.repeat(conn, conn.shape[1], axis=1).ravel(), np.tile(conn, (1, conn.shape[1])).ravel()
+    there = csr_array((np.ones(rows.size), (rows, columns)), shape=graph.shape)
+    there.data[:] = 1.0
+    return csr_array(graph.multiply(there))

@@ -70,6 +70,8 @@ class DensitySolver:
     active_zone: solves with a tolerance of their own are made where gamma changes (see :mod:`.active_zone`).
     regions: elements with limiters of their own; the length l and epsilon are those of `law`.
     kernels: what evaluates the weak forms, a name in :data:`.BACKENDS`.
+    absent: numbers of elements that the balance leaves out, as if the mesh had a cut there; gamma is 0 at their nodes
+        that no other element has.
     gradient: one of :data:`GRADIENTS`, of the sinks that stay on the diagonal; that of others is always "gauss".
 
     Attributes
@@ -83,7 +85,8 @@ class DensitySolver:
 
     def __init__(self, space: Space, law: SinkLaw, sink: str = "lumped", *, tolerance: float = 1e-8,
                  unchanged: float = 1e-12, active_zone: bool = True, regions: Sequence[Region] = (),
-                 kernels: str = "compiled", gradient: str = "monotone") -> None:
+                 kernels: str = "compiled", gradient: str = "monotone",
+                 absent: np.ndarray | None = None) -> None:
         choose("sink", sink, SINKS)
         choose("gradient", gradient, GRADIENTS)
         self.space, self.law, self.sink, self._quadrature = space, law, sink, SINKS[sink]
@@ -95,11 +98,14 @@ class DensitySolver:
         phi = by_element(ne, law.phi, regions, lambda region: region.sink_law.phi)
         self.phi = phi[:, None] if isinstance(phi, np.ndarray) else phi
         self.failure_energy = by_element(ne, law.failure_energy, regions, lambda region: region.sink_law.failure_energy)
-        self.pattern = Pattern(space)
+        self.pattern, self.absent = Pattern(space), np.zeros(0, np.int64) if absent is None else absent
+        self._assembled = Pattern(space) if self.absent.size else self.pattern
+        self._assembled.slot[self.absent] = -1
         self.backend = backend(kernels).density(space, law.length_scale)
         self.load = self._lump(np.ones_like(space.w))
         self._bounded = self._quadrature.monotone and gradient == "monotone"
-        self._laplacian = self.backend.laplacian(self.pattern, monotone=self._bounded)
+        self._laplacian = self.backend.laplacian(self._assembled, monotone=self._bounded)
+        self._laplacian[self.pattern.diagonal[self.load == 0.0]] = 1.0
         self._data, self._laplacian_diagonal = self._laplacian.copy(), self._laplacian[self.pattern.diagonal]
         self._direct: Factorization | None = None
         self._amg = AmgCG(self.pattern.matrix(self._assemble(np.ones_like(space.w))), tolerance)
@@ -116,7 +122,7 @@ class DensitySolver:
     @property
     def _error(self) -> float:
         """Bound of the error of gamma: A^-1 is positive, and A carries gamma = 1 to at least the load."""
-        return 1e-9 + self._residual * float(np.linalg.norm(self.load) / self.load.min())
+        return 1e-9 + self._residual * float(np.linalg.norm(self.load) / self.load[self.load > 0.0].min())
 
     @property
     def factorisations(self) -> int:
@@ -184,12 +190,15 @@ class DensitySolver:
 
     def _assemble(self, sink: np.ndarray) -> np.ndarray:
         if not self._quadrature.monotone:
-            return self._laplacian + self._quadrature.assemble(self.pattern, self.backend, sink)
+            return self._laplacian + self._quadrature.assemble(self._assembled, self.backend, sink)
         self._data[self.pattern.diagonal] = self._laplacian_diagonal + self._lump(sink)
         return self._data  # one array for all solves: only the diagonal changes
 
     def _lump(self, values: np.ndarray) -> np.ndarray:
         """Nodal sums (n,) of Gauss point values; of sink and load alike, so that H = 1 gives gamma = 1."""
+        if self.absent.size:
+            values = values.copy()
+            values[self.absent] = 0.0
         return self._quadrature.sums(self.space, self.backend, values)
 
     def _factorise(self, data: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ from scipy.sparse.csgraph import connected_components
 
 from ..fem.space import Space
 
-__all__ = ["SPENT", "Fragments", "debris", "fragments", "joined"]
+__all__ = ["SPENT", "Fragments", "debris", "fragments", "joined", "pieces_at"]
 
 SPENT = 1e-2        # nodes with a lower gamma carry nothing, and their displacement has no meaning
 
@@ -42,7 +42,7 @@ def joined(conn: np.ndarray, holds: np.ndarray) -> np.ndarray:
 def fragments(space: Space, gamma: np.ndarray, deleted: np.ndarray, length_scale: float, floor: float) -> Fragments:
     """The pieces at the nodal density `gamma` (n,), of elements that are not `deleted` (ne,), joined where it is above
     `floor`."""
-    alive, piece = _pieces(space, gamma, deleted, floor)
+    alive, piece = pieces_at(space, gamma, deleted, floor)
     if not alive.size:
         return Fragments(0, 0, 0.0)
     volume = np.bincount(piece, space.V[alive])
@@ -52,7 +52,7 @@ def fragments(space: Space, gamma: np.ndarray, deleted: np.ndarray, length_scale
 
 def debris(space: Space, gamma: np.ndarray, deleted: np.ndarray, held: np.ndarray, length_scale: float) -> np.ndarray:
     """Numbers of the elements of pieces smaller than l, joined above `SPENT`, without a node that is `held` (n,)."""
-    alive, piece = _pieces(space, gamma, deleted, SPENT)
+    alive, piece = pieces_at(space, gamma, deleted, SPENT)
     if not alive.size:
         return alive
     small = np.bincount(piece, space.V[alive]) < length_scale**space.dim
@@ -60,7 +60,7 @@ def debris(space: Space, gamma: np.ndarray, deleted: np.ndarray, held: np.ndarra
     return alive[small[piece]]
 
 
-def _pieces(space: Space, gamma: np.ndarray, deleted: np.ndarray, floor: float) -> tuple[np.ndarray, np.ndarray]:
+def pieces_at(space: Space, gamma: np.ndarray, deleted: np.ndarray, floor: float) -> tuple[np.ndarray, np.ndarray]:
     """Numbers of the elements that bear force, ascending, and the piece that each of them belongs to."""
     holds = (gamma[space.conn] > floor) & ~deleted[:, None]
     alive = np.flatnonzero(holds.any(axis=1))

@@ -14,8 +14,8 @@ _CHUNK = 8192                                   # elements at a time
 _VOIGT = ([0, 1, 2, 0, 1, 0], [0, 1, 2, 1, 2, 2])    # components xx, yy, zz, xy, yz, xz, in the order of VTK
 
 
-def cauchy_stress(momentum: Momentum, u: np.ndarray) -> np.ndarray:
-    """Cauchy stress [MPa], element means (ne, 6) of the components xx, yy, zz, xy, yz, xz.
+def cauchy_stress(momentum: Momentum, u: np.ndarray, elements: np.ndarray | None = None) -> np.ndarray:
+    """Cauchy stress [MPa], element means (ne, 6) of the components xx, yy, zz, xy, yz, xz; of some `elements` (m, 6).
 
     sigma = P F^T / J with the P = gamma dW/dF (Eq. 11) that the force integrates: the volumetric part of the element
     "jbar" is gamma_bar k (J_bar - 1), one value an element. `u` is the displacement (n, dim); the relative density is
@@ -23,17 +23,35 @@ def cauchy_stress(momentum: Momentum, u: np.ndarray) -> np.ndarray:
     point that exerts a force has J below 0.02 or is inside out, which no stress is defined for.
     """
     space, gamma = momentum.space, momentum.gamma
+    if elements is not None:
+        return _of_some(momentum, u, elements)
     means = np.zeros((space.n_elements, 6))
     for part in momentum.parts:
         for start in range(0, space.n_elements if part.elements is None else part.elements.size, _CHUNK):
             rows = slice(start, start + _CHUNK)
-            elements = rows if part.elements is None else part.elements[rows]
-            means[elements] = np.einsum("eq,eqc->ec", space.w[elements],
-                                        _at_points(momentum, u, part, rows, gamma[elements]))
+            some = rows if part.elements is None else part.elements[rows]
+            means[some] = np.einsum("eq,eqc->ec", space.w[some], _at_points(momentum, u, part, rows, gamma[some]))
     return np.asarray(means / space.V[:, None])
 
 
-def _at_points(momentum: Momentum, u: np.ndarray, part: Part, rows: slice, gamma: np.ndarray) -> np.ndarray:
+def _of_some(momentum: Momentum, u: np.ndarray, elements: np.ndarray) -> np.ndarray:
+    """Stress of some elements (m,), in any order."""
+    means, w = np.zeros((elements.size, 6)), momentum.space.w[elements]
+    for part in momentum.parts:
+        if part.elements is None:
+            here, rows = np.arange(elements.size), elements
+        else:
+            here = np.flatnonzero(np.isin(elements, part.elements))
+            order = np.argsort(part.elements)
+            rows = order[np.searchsorted(part.elements, elements[here], sorter=order)]
+        if here.size:
+            means[here] = np.einsum("eq,eqc->ec", w[here],
+                                    _at_points(momentum, u, part, rows, momentum.gamma[elements[here]]))
+    return np.asarray(means / momentum.space.V[elements, None])
+
+
+def _at_points(momentum: Momentum, u: np.ndarray, part: Part, rows: slice | np.ndarray,
+               gamma: np.ndarray) -> np.ndarray:
     """Stress at the Gauss points of some elements of a part, whose density is `gamma`."""
     space, material, k = momentum.space, part.material, part.material.bulk_modulus
     elements = rows if part.elements is None else part.elements[rows]

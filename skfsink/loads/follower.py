@@ -8,10 +8,10 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array
 
 from ..errors import ParameterError
+from ..fem.facets import Facets
 from ..fem.kernels.surface import add_pressure, pressure_tangents, swept_volumes
 from ..fem.pattern import Pattern
 from ..fem.space import Space
-from ..fem.surface import Facets
 from .grips import Ramp
 from .pressure import Filling, Pressure
 from .wetted import WettedSurface

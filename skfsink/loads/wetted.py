@@ -9,8 +9,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from ..errors import MeshError, ParameterError
+from ..fem.facets import Facets, boundary_facets, facets_of
 from ..fem.space import Space
-from ..fem.surface import Facets, boundary_facets, facets_of
 
 __all__ = ["WettedSurface"]
 

@@ -118,7 +118,7 @@ class StaticLoading:
             if change <= c.gamma_tolerance:
                 return _Settled(u, force, density, W_max, W)
             growing, self.factor = growing + 1 if change > 0.98 * last else 0, change / last
-            if growing >= 3 or gamma.min() < 0.2:
+            if growing >= 3 or self.body.kept(gamma).min() < 0.2:
                 self.refused = "runs away"
                 return None
             last = change
@@ -166,7 +166,7 @@ class StaticLoading:
 
     def _refused(self, state: State, settled: _Settled, increment: float, force: np.ndarray) -> str:
         """Why an increment at whose end the body has settled cannot be taken; empty if it can."""
-        if settled.density.gamma.min() > self.SOUND:
+        if self.body.kept(settled.density.gamma).min() > self.SOUND:
             return ""
         growth, loss = self._growth(state, settled, force)
         if growth > self.SOFT[0] and loss < self.SOFT[1]:

@@ -46,7 +46,7 @@ class LoadingFromRest:
         if not speed > 0.0:
             raise ParameterError("start rest needs a grip that moves from the beginning on; all of them are still: "
                                  "give one a velocity, or take start onset")
-        self._fast = self.FAST * speed
+        self._body, self._fast = body, self.FAST * speed
         longest = max(self.INCREMENT * body.size / speed, 2 * controls.dt)
         self._last = controls.dt
         self.integrator = HHT(body, replace(
@@ -64,7 +64,8 @@ class LoadingFromRest:
         """Load `state` to the onset, yielding it after each step; the last one is the onset."""
         if state.step == 0:
             self.integrator.begin(state)
+        # under fast grips the body cracks before it is faster than they are
         while (self.integrator.dt > self._last and float(np.abs(state.v).max()) < self._fast
-               and state.gamma.min() >= CRACKED):  # under fast grips the body cracks before it is faster than they are
+               and self._body.kept(state.gamma).min() >= CRACKED):
             self.integrator.step(state)
             yield state

@@ -7,11 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
+from ..results.fragments import FRAGMENTS, read_fragments
 from ..results.frame import Frame, frame_file, read_frame
 from ..results.history import History
+from ..results.probes import read_probes
 from ..results.result import Result
 from ..results.series import frame_times
 from ..scene.scene import Scene
+from .piece_picture import piece_picture
 from .plot import (
     animation,
     comparison_picture,
@@ -21,6 +24,7 @@ from .plot import (
     speed_picture,
     tip_picture,
 )
+from .probe_curves import probe_picture
 
 __all__ = ["draw_comparison", "draw_run"]
 
@@ -28,7 +32,8 @@ _WORDS = {"onset": "onset", "branching": "first branches", "arrival": "first arr
 
 
 def draw_run(scene: Scene, folder: Path, series: str, moments: Mapping[str, int]) -> None:
-    """`density.png`, `speed.png` (dynamic), `energies.png`, `tip.png` and `animation.gif` of a finished run.
+    """`density.png`, `speed.png` (dynamic), `energies.png`, `tip.png` and `animation.gif` of a finished run;
+    `probes.png` of one with probes, and `fragments.png` of a body that has come apart.
 
     They are drawn from the files in `folder`. `series` names the one to draw, "run", or "loading" of a body that did
     not fail; `moments` has the numbers of the frames at key moments.
@@ -38,6 +43,7 @@ def draw_run(scene: Scene, folder: Path, series: str, moments: Mapping[str, int]
     kind = "quasi-static" if quasistatic else f"dynamic, {scene.controls.integrator}"
     title = f"{scene.title}, mesh {scene.sample.name}, {kind}"
     history = History.load(folder / "history.csv")
+    _draw_probes(folder, title, quasistatic)
     if series == "loading":
         _draw_loading(scene, folder)
         return
@@ -51,6 +57,7 @@ def draw_run(scene: Scene, folder: Path, series: str, moments: Mapping[str, int]
     if not quasistatic:
         speed_picture(space, [frames[k] for k in keys], folder / "speed.png", title, scene.view)
     ledger_picture(history, folder / "energies.png", title)
+    _draw_pieces(scene, folder, frames[-1], title)
     part = max(scene.parts, key=lambda part: int(frames[-1].deleted[part.elements].sum()))  # where the crack has run
     if len(scene.parts) > 1 and not quasistatic:
         title += f"\n$c_s$, $c_R$ {'in region ' + part.name if part.name else 'outside of the regions'}"
@@ -68,6 +75,24 @@ def _draw_loading(scene: Scene, folder: Path) -> None:
     density_picture(space, [frames[k] for k in keys], folder / "density.png", title, scene.view)
     loading_picture(History.load(folder / "history.csv"), folder / "loading.png", title)
     animation(space, frames, folder / "animation.gif", view=scene.view)
+
+
+def _draw_probes(folder: Path, title: str, quasistatic: bool) -> None:
+    """`probes.png`, of a run that has probes."""
+    if probes := read_probes(folder):
+        probe_picture(probes, folder / "probes.png", title, quasistatic)
+
+
+def _draw_pieces(scene: Scene, folder: Path, frame: Frame, title: str) -> None:
+    """`fragments.png`, of a body that has come apart."""
+    rows = read_fragments(folder / FRAGMENTS) if (folder / FRAGMENTS).exists() else {}
+    if not rows or len(first := np.flatnonzero(rows["piece"] == 1)) == 0 or rows["piece"][-1] < 2:
+        return
+    last = {name: values[first[-1]:] for name, values in rows.items()}
+    density = np.empty((scene.space.n_elements, 1))
+    for part in scene.parts:
+        density[part.elements] = part.material.rho0
+    piece_picture(scene.space, frame, last, density, folder / "fragments.png", title, scene.view)
 
 
 def _frame(folder: Path, number: int, time: float, word: str, scene: Scene) -> Frame:

@@ -31,7 +31,7 @@ from . import body as deformed
 from .body import OBLIQUE, Body, View
 
 __all__ = ["GAMMA_MAP", "STYLE", "Frame", "animation", "comparison_picture", "density_bar", "density_picture",
-           "draw_body", "ledger_picture", "loading_picture", "save_gif", "speed_picture", "tip_picture"]
+           "draw_body", "ledger_picture", "loading_picture", "save", "save_gif", "speed_picture", "tip_picture"]
 
 History = Mapping[str, np.ndarray]  # columns, as `output.History.load` gives them
 
@@ -103,7 +103,7 @@ def density_picture(space: Space, frames: Sequence[Frame], path: str | Path, tit
     _panels(axes, bodies, [frame.title for frame in frames], box)
     for ax in axes:
         ax.label_outer()
-    _save(figure, path, title)
+    save(figure, path, title)
 
 
 @matplotlib.rc_context(STYLE)
@@ -118,7 +118,7 @@ def speed_picture(space: Space, frames: Sequence[Frame], path: str | Path, title
     bar.set_label("speed of the material (m/s)")
     for ax in axes:
         ax.label_outer()
-    _save(figure, path, title)
+    save(figure, path, title)
 
 
 def _page(n: int, ratio: float) -> tuple[Figure, list[Axes]]:
@@ -189,7 +189,7 @@ def comparison_picture(space: Space, dynamic_frame: Frame, quasistatic_frame: Fr
     bars.set(ylabel=f"energy ({unit})", title="(c) energies at the end", ymargin=0.15)
     bars.set_xticks(range(len(groups)), list(groups.values()))
     bars.legend()
-    _save(figure, path, title)
+    save(figure, path, title)
 
 
 # --- curves ---
@@ -219,7 +219,7 @@ def loading_picture(history: History, path: str | Path, title: str = "") -> None
     low.plot(np.append(0, x), np.append(1, gamma), color=RED)
     low.set(xlabel="displacement of the grips (mm)", ylabel=r"least $\gamma$", ylim=(0, 1.05))
     figure.align_ylabels()
-    _save(figure, path, title)
+    save(figure, path, title)
 
 
 @matplotlib.rc_context(STYLE)
@@ -246,7 +246,7 @@ def ledger_picture(history: History, path: str | Path, title: str = "") -> None:
     low.plot(time, error, "k")
     low.set(xlabel=label, ylabel="balance error\n(% of onset)", ylim=(-limit, limit))
     figure.align_ylabels()
-    _save(figure, path, title)
+    save(figure, path, title)
 
 
 @matplotlib.rc_context(STYLE)
@@ -277,10 +277,11 @@ def tip_picture(history: History, path: str | Path, title: str, shear_wave_speed
     count.set(xmargin=0, ylim=(0, 3 * max(2, event["branches"].max())))  # in the lower third, clear of the speed
     count.set_ylabel("branches", color=BLUE)
     count.locator_params(axis="y", nbins=6, integer=True)
-    _save(figure, path, title)
+    save(figure, path, title)
 
 
-def _save(figure: Figure, path: str | Path, title: str) -> None:
+def save(figure: Figure, path: str | Path, title: str) -> None:
+    """Write a figure with its title, in the format that the name of the file says."""
     figure.suptitle(title)
     kind = Path(path).suffix.lstrip(".") or "png"
     with replaced(path) as part:

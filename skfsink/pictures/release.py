@@ -9,7 +9,7 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-from .plot import RED, STYLE, WIDTH, _save
+from .plot import RED, STYLE, WIDTH, save
 
 __all__ = ["release_picture"]
 
@@ -49,4 +49,4 @@ def release_picture(columns: Mapping[str, np.ndarray], path: str | Path, title: 
     figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=2)
     low.set(xlabel=label, ylabel="speed (m/s)", ylim=(0, None))
     figure.align_ylabels()
-    _save(figure, path, title)
+    save(figure, path, title)

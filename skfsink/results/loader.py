@@ -22,8 +22,10 @@ import numpy as np
 from ..errors import OutputError
 from ..scene.stored import SCENE, StoredScene
 from ..system.files import reported
+from .fragments import FRAGMENTS, read_fragments
 from .frame import frame_file
 from .history import History, Table, deletions_header
+from .probes import ProbeTable, read_probes
 from .series import frame_times
 from .summary import SUMMARY, read_summary
 
@@ -222,6 +224,16 @@ class Run:
             return Deletions(np.array([float(time) for time, _ in rows]), np.array([int(e) for _, e in rows], int))
         except ValueError:
             raise OutputError(f"{path} is no log of failed elements, or is damaged") from None
+
+    @cached_property
+    def probes(self) -> dict[str, ProbeTable]:
+        """Columns of `probes/NAME.csv` as arrays, with their `units`, by the name of the probe; empty without any."""
+        return read_probes(self._own("."))
+
+    @cached_property
+    def fragments(self) -> dict[str, np.ndarray]:
+        """Columns of `fragments.csv` as arrays: the pieces of the body at each look and the end, the heaviest first."""
+        return read_fragments(self._own(FRAGMENTS))
 
     @cached_property
     def energies(self) -> dict[str, Energy]:

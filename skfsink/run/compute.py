@@ -18,6 +18,7 @@ from ..fields.state import State
 from ..meshing.kept_mesh import MESH, keep_mesh
 from ..pictures.of_a_run import draw_comparison, draw_run
 from ..results.history import History
+from ..results.probes import PROBES
 from ..results.result import Result
 from ..results.summary import write_summary
 from ..scene.case import Case
@@ -35,6 +36,7 @@ from .display import Display
 from .memory import check_memory
 from .observers.observer import Observer, Observers
 from .observers.onset import Strength
+from .observers.probe_surfaces import probes_of
 from .occupied import occupied
 from .request import RunRequest, read_request
 from .simulate import Loaded, Simulation, standard_observers
@@ -167,7 +169,9 @@ def _check(scene: Scene, job: _Job) -> None:
     both = scene.controls.analysis == "both"
     if job.resumes and not (job.folder / SCENE).is_file():
         raise CheckpointError(f"there is no run to go on with in {job.folder}: it has no {SCENE}")
-    Observers(standard_observers(scene, job.display), job.observers, job.resumes and not both)
+    users = (*probes_of(scene), *job.observers)
+    for observer in Observers(standard_observers(scene, job.display), users, job.resumes and not both):
+        observer.check(scene)
     if both:
         _copied(job.observers)
     check_memory(scene, job.display)
@@ -193,6 +197,8 @@ def _begin(folder: Path, overwrite: bool) -> None:
     prepare_folder(folder, overwrite)
     for name in (SCENE, SUMMARY, Simulation.CHECKPOINT, Simulation.ONSET):
         (folder / name).unlink(missing_ok=True)
+    for path in (folder / PROBES).glob("*.csv"):  # that are not written anew
+        path.unlink()
 
 
 def _write_scene(scene: Scene, folder: Path, parts: tuple[str, ...]) -> None:

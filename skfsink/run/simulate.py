@@ -24,12 +24,14 @@ from .cost import Cost
 from .display import Display, Interrupt
 from .notes import Notes
 from .observers.crack import Crack, tracker_of
+from .observers.fragments import Fragments
 from .observers.frames import Frames
 from .observers.guard import Guard
 from .observers.history import Deletions, History
 from .observers.observer import Observer, Observers
 from .observers.onset import Onset, Strength
 from .observers.places import check_arrival, onset_text
+from .observers.probe_surfaces import probes_of
 from .observers.progress import Checkpoint, Progress
 from .observers.range import check_scene
 from .observers.view import View
@@ -84,13 +86,13 @@ class Simulation:
         self.momentum, self.density, self.free = self.body.momentum, self.body.density, self.body.free
         self.statics = Statics(self.body, scene.controls.statics)
         self.notes = Notes(display.say, memory.get("warnings", ()))
-        self.state = stored.state if stored else State.intact(self.body.space)
+        self.state = stored.state if stored else self.body.begin()
         self.costs = Cost(memory.get("cost"))
         self.integrator: Integrator | None = None
         self._from_rest: LoadingFromRest | None = None
         tracker = tracker_of(scene, self.body)
         self.view = View(scene, folder, self.body, tracker, tracker.nothing(), self.state, save=self._save)
-        self.observers = Observers(standard_observers(scene, display), observers, resume)
+        self.observers = Observers(standard_observers(scene, display), (*probes_of(scene), *observers), resume)
         of = self.observers.of
         self.crack, self.guard, self.frames = of(Crack), of(Guard), of(Frames)
         self.onset, self.strength, self.history = of(Onset), of(Strength), of(History)
@@ -273,4 +275,4 @@ def standard_observers(scene: Scene, display: Display) -> list[Observer]:
     c = scene.controls
     every = c.record_every
     return [Crack(every), History(every), Strength(), Onset(), Frames(c.frame_every), Guard(every), Deletions(),
-            Progress(display, every), Checkpoint(c.checkpoint_every)]
+            Fragments(), Progress(display, every), Checkpoint(c.checkpoint_every)]

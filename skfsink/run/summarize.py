@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ..fields.body import Body
 from ..fields.energy import OPTIONAL_TERMS
 from ..fields.fragments import fragments
 from ..fields.momentum import terms_without
@@ -15,6 +16,7 @@ from ..results.summary import versions
 from ..scene.scene import Scene
 from .material_point import beside_theory
 from .memory import peak_rss_mb
+from .observers.fragments import fragment_summary
 from .observers.places import greatest_ratio
 from .quantities import measured
 from .simulate import Simulation
@@ -27,6 +29,7 @@ SCHEMA = 3   # 2 counted "sweeps"; 1 had "reaction_N_per_mm" for forces [N] on b
 
 def summarize(scene: Scene, simulation: Simulation) -> dict[str, Any]:
     """Summary of a finished run; figures of the onset and of the event are null in one that did not fail."""
+    body = simulation.body
     state, crack, greatest = simulation.state, simulation.crack, simulation.strength.greatest
     ledger, onset, tracker = state.ledger, simulation.onset.figures, crack.tracker
     space, cost = scene.sample.space, simulation.cost()
@@ -34,7 +37,7 @@ def summarize(scene: Scene, simulation: Simulation) -> dict[str, Any]:
     without = terms_without(simulation.momentum, dynamic)
     units = history_units(space.dim)
     balances = [abs(row["balance"]) for row in simulation.history.rows if row["phase"] != "loading"]
-    ratio, place = greatest_ratio(simulation.density, state)
+    ratio, place = greatest_ratio(simulation.density, body.since_begun(state))
     if "ratio" in onset:  # while it was loaded; beyond, W of dead points grows without meaning
         ratio, place = onset["ratio"], onset["place_of_ratio"]
     return {
@@ -68,9 +71,11 @@ def summarize(scene: Scene, simulation: Simulation) -> dict[str, Any]:
                    **({} if simulation.momentum.followers is None else
                       {"pressure_work": onset.get("pressure_work", 0.0) + ledger.pressure_work}),
                    "balance_error_relative": max(balances, default=0.0) / onset["elastic_energy"] if onset else None},
+        **({"cracks": crack_summary(scene, body)} if scene.cracks else {}),
+        "fragments": fragment_summary(simulation.body, state, scene.sink_law.length_scale),
         "quantities": measured(scene, simulation), "model": dict(scene.model_choice) or None,
         "whole": {"energy": scene.whole.energy, "load": scene.whole.load, "displacement": scene.whole.displacement},
-        "deleted_elements": int(state.deleted.sum()), "warnings": simulation.notes.texts,
+        "deleted_elements": len(state.deletions), "warnings": simulation.notes.texts,
         "notes": list(scene.sample.notes),
         "cost": {"wall_s": {k: round(v, 3) for k, v in cost["wall"].items()}, "steps": cost["steps"],
                  "rejected_steps": cost["rejected_steps"], "gamma_solves": cost["gamma_solves"],
@@ -78,6 +83,19 @@ def summarize(scene: Scene, simulation: Simulation) -> dict[str, Any]:
                  "peak_rss_mb": round(peak_rss_mb(), 1)},
         "versions": versions(), "assumed": list(scene.assumed), "moments": simulation.frames.moments,
         "series": "loading" if simulation.unfailed else "run"}
+
+
+def crack_summary(scene: Scene, body: Body) -> list[dict[str, Any]]:
+    """Initial cracks: their elements, extent and width, and the width of what they took of the density, all of
+    them over their whole extent."""
+    state, space = body.begin(), scene.space
+    lost = float(np.einsum("eq,eq->", space.w, 1.0 - body.momentum.effective(state.gamma, state.deleted)))
+    extents = [crack.extent for crack in scene.cracks]
+    whole = None if None in extents or not extents else sum(extents)  # type: ignore[arg-type]
+    extent = "length_mm" if space.dim == 2 else "area_mm2"
+    return [{"name": crack.name, "lips": crack.lips, "elements": crack.elements.size, extent: crack.extent,
+             "width_mm": crack.width(space), "lost_width_mm": None if whole is None else lost / whole}
+            for crack in scene.cracks]
 
 
 def _material_point(scene: Scene, simulation: Simulation) -> dict[str, Any] | None:

@@ -18,8 +18,8 @@ def verdict(scene: Scene, simulation: Simulation) -> str:
     """One line on what happened in a finished run."""
     state, tracker, event = simulation.state, simulation.crack.tracker, scene.controls.event_time
     if simulation.unfailed:
-        ratio, place = greatest_ratio(simulation.density, state)
-        least = float(state.gamma.min())
+        ratio, place = greatest_ratio(simulation.density, simulation.body.since_begun(state))
+        least = float(simulation.body.kept(state.gamma).min())
         soft = f"; the body has softened to gamma = {least:.3g}" if least < SOFTENED else ""
         return (f"nothing failed: the greatest W/Phi was {ratio:.3g}, at {place_text(place)} mm, where points fail "
                 f"near 1{soft}; the loading ended because {simulation.unfailed}")
@@ -35,7 +35,7 @@ def verdict(scene: Scene, simulation: Simulation) -> str:
         why = ("the body is loaded evenly, and no place of it is weaker than another; its result is the greatest load"
                if even else simulation.statics.arrested or "what has begun takes a longer event_time to run away")
         when = "past the onset" if quasistatic else f"in the event_time of {event:g} s"
-        return f"nothing cracked {when}, least gamma {state.gamma.min():.3g}: {why}"
+        return f"nothing cracked {when}, least gamma {simulation.body.kept(state.gamma).min():.3g}: {why}"
     if tracker.separated:
         first = "" if tracker.arrival is None else f", arrived first {_when(scene, tracker.arrival)}"
         return f"cracked and separated{first}; apart {_when(scene, simulation.crack.separated_at)}"

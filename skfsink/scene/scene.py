@@ -12,12 +12,14 @@ from ..errors import MeshError, ParameterError
 from ..fem.backends import backend
 from ..fem.elements import check_element
 from ..fem.space import Space
+from ..fields.fragments import joined
 from ..loads.grips import Grip, Ramp, Traction
 from ..loads.nodal import NodalLoads
 from ..loads.pressure import Filling, Pressure
 from ..loads.schedule import Loading
 from ..material import Material, SinkLaw
 from ..material.regions import Region, check_lengths, divided
+from ..meshing.cracks import InitialCrack
 from ..meshing.mesh_file import one_line
 from ..meshing.sample import Sample
 from ..meshing.symmetry import Whole
@@ -47,6 +49,7 @@ class Scene:
         first one is the load that is reported.
     loads: dead loads of other kinds, each made from the spaces by a function or an object that is called.
     regions: elements of other materials than `material`; no element is in two.
+    cracks: elements that are broken from the start, so that the mesh need not have the crack.
     faces: in three dimensions, the surfaces of a sheet along which a crack runs; they are no edges it arrives at.
     view: azimuth and elevation [degrees] from which pictures show a body in space.
     rollers: boundaries held on planes of symmetry or between faces; they are no grips.
@@ -54,6 +57,7 @@ class Scene:
     flat: maps points of the body (n, dim) to its section (n, 2) [mm].
     controls: how it is computed.
     assumed: statements about lengths that the paper does not print.
+    probes: what is followed through a run, as tables of a deck; it decides nothing of it.
     model_choice: how the model was chosen, as it is printed and stored; it decides nothing beyond the parameters.
 
     Raises
@@ -61,7 +65,7 @@ class Scene:
     MeshError
         The mesh lacks the boundary of a grip, or one of the faces.
     ParameterError
-        The element is not for meshes of this dimension, or a region for this body.
+        The element is not for meshes of this dimension, or a region for this body; or initial cracks leave none.
     """
 
     case: str
@@ -75,6 +79,7 @@ class Scene:
     pressures: tuple[Pressure | Filling, ...] = ()
     loads: tuple[Callable[[Space], NodalLoads], ...] = ()
     regions: tuple[Region, ...] = ()
+    cracks: tuple[InitialCrack, ...] = ()
     faces: tuple[str, ...] = ()
     view: tuple[float, float] = (-75.0, 60.0)
     rollers: tuple[Grip, ...] = ()
@@ -82,6 +87,7 @@ class Scene:
     flat: Callable[[np.ndarray], np.ndarray] = _first_two
     controls: Controls = field(default_factory=Controls)
     assumed: tuple[str, ...] = ()
+    probes: tuple[Mapping[str, Any], ...] = ()
     model_choice: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -97,6 +103,7 @@ class Scene:
         backend(self.controls.kernels).check(self.sample.space)
         check_lengths(self.sink_law, self.regions)
         _ = self.parts
+        self._check_cracks()
         loading = self.loading()
         if self.controls.start == "rest" and (loading.knots or loading.dead or loading.followers):
             what = ("tractions" if self.tractions else "dead loads" if loading.dead else
@@ -106,6 +113,37 @@ class Scene:
         if self.controls.start == "rest" and loading.speed(0.0) == 0.0:
             raise ParameterError("start rest needs a grip that moves; all of them are still: give one a velocity, or "
                                  "take start onset")
+
+    def _check_cracks(self) -> None:
+        """Refuse initial cracks that cut the body into pieces, or take a whole boundary that is held or loaded."""
+        if not self.cracks:
+            return
+        space, whole = self.space, np.ones(self.space.n_nodes, bool)
+        names = [crack.name for crack in self.cracks]
+        if twice := next((name for name in names if names.count(name) > 1), None):
+            raise ParameterError(f"two cracks are called {twice}: give one of them another name")
+        whole[space.conn[self.broken]] = False
+        for boundary in (load.boundary for group in (self.grips, self.tractions) for load in group):
+            if not whole[self.sample.nodes(boundary)].any():
+                raise ParameterError(f"cracks {', '.join(names)} take the whole boundary {boundary}, which is held or "
+                                     f"loaded: make them smaller")
+        holds = whole[space.conn[np.setdiff1d(np.arange(space.n_elements), self.broken)]]
+        conn = np.delete(space.conn, self.broken, axis=0)[holds.any(axis=1)]
+        pieces = len(np.unique(joined(conn, holds[holds.any(axis=1)])))
+        if pieces != 1:
+            raise ParameterError(f"cracks {', '.join(names)} cut the body into {pieces} pieces before it is loaded: a "
+                                 f"crack must leave it whole")
+
+    @property
+    def broken(self) -> np.ndarray:
+        """Numbers of the elements of initial cracks, ascending."""
+        return np.unique(np.concatenate([np.zeros(0, np.int64), *(crack.elements for crack in self.cracks)]))
+
+    @property
+    def cut(self) -> np.ndarray:
+        """Numbers of the elements of initial cracks whose lips are whole, ascending."""
+        cuts = [crack.elements for crack in self.cracks if crack.lips == "whole"]
+        return np.unique(np.concatenate([np.zeros(0, np.int64), *cuts]))
 
     @property
     def space(self) -> Space:
@@ -183,4 +221,5 @@ class Scene:
         return digest([text, space.X, space.conn, self.sample.boundaries, controls,
                        tuple(backend(controls.kernels)), self.material, self.sink_law, self.regions, self.grips,
                        self.rollers, self.tractions, self.loads, self.faces, self.whole,
-                       *((self.pressures,) if self.pressures else ())])
+                       *((self.pressures,) if self.pressures else ()),
+                       *([self.broken, self.cut] if self.cracks else [])])

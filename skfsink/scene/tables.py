@@ -10,6 +10,10 @@
     boundary = "inner"                          boundary = "inner"
     value = "16 kPa"                            inflow = "1 mm^3/s"
     in_crack = true                             compliance = "0.1 mm^3/kPa"
+    [[probes]]                                  what is followed: see `skfsink.run.observers`
+    name = "tip"
+    kind = "point"
+    position = ["1 mm", "2 mm"]
 """
 
 from __future__ import annotations
@@ -25,10 +29,12 @@ from ..loads.grips import Grip, Ramp, Traction
 from ..loads.pressure import Filling, Pressure
 from ..material import MATERIALS, own_constants
 from ..material.regions import RegionLaw, one_bulk_modulus
+from ..meshing.cracks import InitialCrack, crack_along, crack_of_elements
+from ..meshing.sample import Sample
 from ..units import Unit, number_in
 from .typed import Mistake, Record
 
-__all__ = ["grips_of", "pressures_of", "read_tables", "regions_of", "tractions_of"]
+__all__ = ["cracks_of", "grips_of", "pressures_of", "read_tables", "regions_of", "tractions_of"]
 
 AXES = ("x", "y", "z")
 MOST = 1000  # tables of a kind, points of a ramp
@@ -70,6 +76,31 @@ class PressureCourse(Course):
         return ramp
 
 
+@dataclass(frozen=True)
+class Place:
+    """Mark in the annotation of a point: a list of coordinates [mm]."""
+
+    def read(self, value: Any) -> list[float]:
+        """The point in plain numbers; the ParameterError is to follow its name."""
+        if not isinstance(value, list | tuple) or len(value) not in (2, 3):
+            raise ParameterError(f" must be 2 or 3 coordinates [x, y, z]; got {value!r:.80}")
+        return [require("", number_in("", x, "mm"), "mm") for x in value]
+
+
+@dataclass(frozen=True)
+class Way:
+    """Mark in the annotation of a list of points."""
+
+    def read(self, value: Any) -> list[list[float]]:
+        """The points in plain numbers; the ParameterError is to follow its name."""
+        if not isinstance(value, list | tuple) or not 2 <= len(value) <= MOST:
+            raise ParameterError(f" must be 2 to {MOST} points [x, y, z]; got {value!r:.80}")
+        try:
+            return [Place().read(point) for point in value]
+        except ParameterError as error:
+            raise ParameterError(f": a point{error}") from None
+
+
 def _message(kind: str, mistake: Mistake, table: Any) -> str:
     key = next(iter(TYPES[kind]))
     if not mistake.field:
@@ -89,7 +120,12 @@ TYPES: Mapping[str, Mapping[str, Any]] = {
                   "rate": Annotated[float, Unit("MPa/s")], "in_crack": bool},
     "fillings": {"boundary": str, "inflow": Annotated[list, Course("mm^3/s", "mm^3")],
                  "compliance": Annotated[float, Unit("mm^3/MPa")]},
-    "regions": get_type_hints(RegionLaw, include_extras=True)}
+    "regions": get_type_hints(RegionLaw, include_extras=True),
+    "probes": {"name": str, "kind": str, "position": Annotated[list, Place()], "to": Annotated[list, Place()],
+               "points": int, "boundary": str, "to_boundary": str, "quantity": str,
+               "every": Annotated[float, Unit("s")], "every_passes": int},
+    "cracks": {"name": str, "points": Annotated[list, Way()], "lips": str, "width": Annotated[float, Unit("mm")],
+               "elements": str}}
 NEEDED = {"fillings": ("boundary", "inflow", "compliance")}
 RECORDS = {kind: Record(types, partial(_message, kind), needed=NEEDED.get(kind, (next(iter(types)),)), finite=True)
            for kind, types in TYPES.items()}
@@ -113,9 +149,8 @@ def read_tables(kind: str, tables: Any) -> tuple[dict[str, Any], ...]:
             if ("value" in table) == ("rate" in table):
                 raise ParameterError(f"pressure {table['boundary']} must have a value (a pressure, or a ramp of points "
                                      f"[time, pressure]) or a rate; got {'both' if 'rate' in table else 'neither'}")
-    if kind in ("pressures", "fillings"):
-        return tuple(read)
-    return tuple({name: course for name, course in table.items() if kind == "grips" or course != 0.0} for table in read)
+    return tuple({name: course for name, course in table.items() if kind != "tractions" or course != 0.0}
+                 for table in read)
 
 
 def _with_constants(table: Mapping[str, Any]) -> dict[str, Any]:
@@ -180,6 +215,29 @@ def pressures_of(pressures: Sequence[Mapping[str, Any]],
 def regions_of(tables: Sequence[Mapping[str, Any]]) -> tuple[RegionLaw, ...]:
     """What regions are made of, from their tables."""
     return tuple(RegionLaw(**table) for table in read_tables("regions", tables))
+
+
+def cracks_of(tables: Sequence[Mapping[str, Any]], sample: Sample) -> tuple[InitialCrack, ...]:
+    """The initial cracks of a sample from their tables (SkfsinkError)."""
+    return tuple(_crack(table, sample) for table in read_tables("cracks", tables))
+
+
+def _crack(table: Mapping[str, Any], sample: Sample) -> InitialCrack:
+    name = table["name"]
+    if ("points" in table) == ("elements" in table):
+        raise ParameterError(f"crack {name} needs points or elements, the name of a set of them"
+                             + (", not both" if "points" in table else ""))
+    if "lips" not in table:
+        raise ParameterError(f"crack {name} needs lips, which decide on the onset: broken as those of a crack that has "
+                             f"run, or whole as those of a cut")
+    lips = table["lips"]
+    if "elements" in table:
+        if "width" in table:
+            raise ParameterError(f"crack {name}: width is for points; a set of elements is as wide as it is")
+        return crack_of_elements(sample.space, name, sample.elements(table["elements"]), lips)
+    width = table.get("width")
+    return crack_along(sample.space, name, table["points"], lips,
+                       None if width is None else require(f"crack {name}: width", width, "mm", low=0, low_open=True))
 
 
 def _components(kind: str, table: Mapping[str, Any], dim: int, missing: float | None) -> tuple[Any, ...]:

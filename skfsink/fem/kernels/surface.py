@@ -1,6 +1,6 @@
 """Compiled loops over facets of the deformed surface: a pressure on them, its derivative, the volume they sweep.
 
-With the order of nodes of :mod:`skfsink.fem.surface` the area vector n dA of the edge from x_0 to x_1 is (dy, -dx), and
+With the order of nodes of :mod:`skfsink.fem.facets` the area vector n dA of the edge from x_0 to x_1 is (dy, -dx), and
 that of a face x,s × x,t ds dt. Products of shape functions with it are polynomials, which 2 x 2 Gauss points integrate
 exactly; along a straight motion the area vector is of second order, and two points integrate it exactly as well.
 """

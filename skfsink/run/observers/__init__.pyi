@@ -1,4 +1,5 @@
 from .crack import Crack as Crack
+from .fragments import Fragments as Fragments
 from .frames import Frames as Frames
 from .guard import Guard as Guard
 from .history import Deletions as Deletions
@@ -6,6 +7,13 @@ from .history import History as History
 from .observer import Observer as Observer
 from .onset import Onset as Onset
 from .onset import Strength as Strength
+from .probe import LineProbe as LineProbe
+from .probe import MeanProbe as MeanProbe
+from .probe import PointProbe as PointProbe
+from .probe import Probe as Probe
+from .probe_surfaces import OpeningProbe as OpeningProbe
+from .probe_surfaces import ReactionProbe as ReactionProbe
+from .probe_surfaces import VolumeProbe as VolumeProbe
 from .progress import Checkpoint as Checkpoint
 from .progress import Progress as Progress
 from .release import EnergyRelease as EnergyRelease

@@ -22,7 +22,8 @@ def tracker_of(scene: Scene, body: Body) -> CrackTracker:
     names = [*(grip.boundary for grip in scene.grips), *(traction.boundary for traction in scene.tractions)]
     held = [scene.sample.nodes(name) for name in dict.fromkeys(names)]
     slowest = None if scene.controls.analysis == "quasistatic" else body.momentum.shear_wave_speeds[0]
-    return CrackTracker(scene.sample.space, scene.sink_law.length_scale, slowest, held, *rim_of(scene))
+    return CrackTracker(scene.sample.space, scene.sink_law.length_scale, slowest, held, *rim_of(scene),
+                        before=body.cracked, gone=body.broken)
 
 
 class Crack(Observer):

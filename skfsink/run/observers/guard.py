@@ -137,9 +137,10 @@ class Guard(Observer):
         InstabilityError
             The ledger of the loading does not close, or a live point is inside out.
         """
-        loaded = self._loaded(state)
+        begun = self._view.body.since_begun(state)
+        loaded = self._loaded(begun)
         self.scale, self.evenness = state.ledger.elastic, self._even_share(loaded)
-        check_onset(self.scene, state)
+        check_onset(self.scene, begun)
         self.notch = check_tip(self.space, int(np.argmax(loaded)))
         error, allowed = state.ledger.error(state.ledger.elastic), self.scene.controls.balance_tolerance
         if not error <= allowed:

@@ -62,8 +62,8 @@ VALUES: dict[str, Callable[[View], Any]] = {
     "tip_speed_m_per_s": lambda view: 0.0 if _timeless(view) else view.tips.speed,
     "tips": lambda view: view.tips.active,
     "branches": lambda view: view.tips.branches,
-    "deleted_elements": lambda view: int(view.state.deleted.sum()),
-    "gamma_min": lambda view: float(view.state.gamma.min()),
+    "deleted_elements": lambda view: len(view.state.deletions),
+    "gamma_min": lambda view: float(view.body.kept(view.state.gamma).min()),
     "dt_s": lambda view: view.dt,
 }
 

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, TypeVar
 
 from ...errors import CheckpointError, ParameterError
+from ...scene.scene import Scene
 from ...scene.schedule import Schedule, check_observers
 from ..checkpoint import storable
 from .view import View
@@ -18,12 +19,12 @@ Kind = TypeVar("Kind", bound="Observer")
 class Observer(Schedule):
     """Base of all observers: one derives from it and overrides `look`, and what else is needed.
 
-    Calls come in this order: `open` when the run begins or goes on, and `prepare`; `loading` after every load
-    increment; `onset` where the loading has ended in a failure; then, in the event, `begin`, `look` at its first
-    state, `look` after every step in which it is :meth:`due`, `pause` between two steps, `look` at its last state,
-    `finish`; at last `close`, however the run has ended. A run that ends without a failure has no event: `unfailed`
-    takes its place. In each call the standard observers come first, :class:`.Crack` before all others, then a user's in
-    the order in which they were given; one that takes the place of a standard one comes in its place.
+    Calls come in this order: `check` of a scene; `open` when the run begins or goes on, and `prepare`; `loading` after
+    every load increment; `onset` where the loading has ended in a failure; then, in the event, `begin`, `look` at its
+    first state, `look` after every step in which it is :meth:`due`, `pause` between two steps, `look` at its last
+    state, `finish`; at last `close`, however the run has ended. A run that ends without a failure has no event:
+    `unfailed` takes its place. In each call the standard observers come first, :class:`.Crack` before all others, then
+    a user's in the order in which they were given; one that takes the place of a standard one comes in its place.
 
     An observer belongs to one run; that run may be resumed with it, another needs a new one.
 
@@ -39,6 +40,9 @@ class Observer(Schedule):
     """
 
     _used = False  #: whether a run has opened it
+
+    def check(self, scene: Scene) -> None:
+        """Refuse what it cannot look at (SkfsinkError), before a run touches its folder."""
 
     def open(self, view: View, memory: Mapping[str, Any] | None = None) -> None:
         """The run begins, or goes on from the `memory` that a checkpoint has; nothing may be written yet."""

@@ -50,7 +50,7 @@ class Onset(Observer):
 
     def onset(self, view: View) -> None:
         """Note the onset."""
-        state, ledger = view.state, view.state.ledger
+        state, ledger = view.body.since_begun(view.state), view.state.ledger
         ratio, place = greatest_ratio(view.body.density, state)
         self.figures = {"displacement_mm": view.displacement, "reaction_N_per_mm": view.load,
                         "elastic_energy": ledger.elastic, "gamma_min": float(state.gamma.min()), "sink": ledger.sink,

@@ -104,6 +104,9 @@ def _boundary_at(scene: Scene, state: State, node: int) -> str:
     x, X, rim = sample.space.X[node], sample.space.X, rim_of(scene)[0]
     others = {*scene.faces, *(name for name, _ in symmetry_planes(scene))}
     best = (limit, 3, len(X), "surface" if rim.size and _distance(X[rim], x) <= limit else "inside")
+    for crack in scene.cracks:
+        distance = _distance(X[sample.space.conn[crack.elements].ravel()], x)
+        best = min(best, (round(distance, 9), 0, crack.elements.size, crack.name))
     for name, nodes in sample.boundaries.items():
         if not nodes.size or name in others or not outer[nodes].all() or nodes.size > SIDE * outer.sum():
             continue
@@ -144,6 +147,8 @@ def check_beginning(scene: Scene, state: State) -> None:
                     "region, or let the boundary slide", min(near)[1], place_text(x), l)
         return
     notch = _notch_nodes(scene)
+    if at in [crack.name for crack in scene.cracks]:
+        return
     if notch.size and (distance := _distance(space.X[notch], x)) > AWAY * l and not _on_plane(scene, x):
         log.warning("the body begins to fail at %s mm (%s), %.3g mm away from its notch (more than %g l): check grips "
                     "and mesh there, and whether the notch is loaded", place_text(x), at, distance, AWAY)

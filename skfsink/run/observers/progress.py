@@ -30,7 +30,7 @@ class Progress(Observer):
         tolerance, state = view.scene.controls.statics.onset_tolerance, view.state
         done = 0.5 * min(1.0, tolerance * state.grip / (view.increment or float("inf"))) ** 0.25
         self.display.update(done, f"grips {view.displacement:.4f} mm  load {view.load:.4f} {_unit(view)}  "
-                                  f"least γ {state.gamma.min():.3f}")
+                                  f"least γ {view.body.kept(state.gamma).min():.3f}")
 
     def due(self, view: View) -> bool:
         """At each record, and when the crack arrives."""

@@ -1,0 +1,72 @@
+"""`fragments.csv`: the pieces of a body at each look, and at the end of the run."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import OutputError
+from ..system.files import reported, write_atomic
+
+__all__ = ["FRAGMENTS", "append_fragments", "fragment_columns", "read_fragments", "write_fragments"]
+
+FRAGMENTS = "fragments.csv"
+_WHOLE = ("step", "piece", "elements")  # columns of whole numbers
+_AXES = ("x", "y", "z")
+
+
+def fragment_columns(dim: int) -> list[str]:
+    """Names of the columns with their units, after `step` and `time_s`; of a plane body per mm of thickness."""
+    per, axes, turns = "_per_mm" if dim == 2 else "", _AXES[:dim], _AXES[2:] if dim == 2 else _AXES
+    return ["piece", "elements", "area_mm2" if dim == 2 else "volume_mm3", f"mass_t{per}",
+            *(f"centre_{axis}_mm" for axis in axes), *(f"velocity_{axis}_mm_per_s" for axis in axes),
+            *(f"momentum_{axis}_N_s{per}" for axis in axes), f"kinetic_N_mm{per}", f"translation_N_mm{per}",
+            f"rotation_N_mm{per}", *(f"angular_momentum_{axis}_N_mm_s{per}" for axis in turns),
+            *(f"spin_{axis}_rad_per_s" for axis in turns)]
+
+
+def write_fragments(path: Path, dim: int, rows: np.ndarray) -> None:
+    """Write the file anew with `rows` (m, columns): step, time, and the columns of :func:`fragment_columns`."""
+    header = ["step", "time_s", *fragment_columns(dim)]
+    write_atomic(path, _csv([header]) + _csv(_cells(rows, header)))
+
+
+def append_fragments(path: Path, dim: int, rows: np.ndarray) -> None:
+    """Add rows to the file (OutputError)."""
+    with reported(f"cannot write {path}"), open(path, "a", encoding="utf-8", newline="") as file:
+        file.write(_csv(_cells(rows, ["step", "time_s", *fragment_columns(dim)])))
+
+
+def _cells(rows: np.ndarray, header: Sequence[str]) -> list[list[Any]]:
+    return [[int(value) if name in _WHOLE else value for name, value in zip(header, row)] for row in rows.tolist()]
+
+
+def _csv(rows: Sequence[Any]) -> str:
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue()
+
+
+def read_fragments(path: Path) -> dict[str, np.ndarray]:
+    """Columns of the file by their names, as arrays (rows,); a last line that was not finished is left out.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be read, or is none of fragments.
+    """
+    with reported(f"cannot read {path}"):
+        text = path.read_text(encoding="utf-8", errors="replace")
+    try:
+        header, *lines = csv.reader(text[:text.rfind("\n") + 1].splitlines())
+        if header[2:] not in (fragment_columns(2), fragment_columns(3)) or any(len(x) != len(header) for x in lines):
+            raise ValueError
+        return {name: np.array([line[i] for line in lines], str).astype(int if name in _WHOLE else float)
+                for i, name in enumerate(header)}
+    except ValueError:
+        raise OutputError(f"{path} is no file of fragments, or is damaged") from None
