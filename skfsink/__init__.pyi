@@ -1,9 +1,14 @@
 from .cases.custom import custom as custom
+from .loads.body_force import BodyForce as BodyForce
+from .loads.curve import Curve as Curve
 from .loads.grips import Grip as Grip
 from .loads.grips import Ramp as Ramp
+from .loads.grips import Sliding as Sliding
 from .loads.grips import Traction as Traction
+from .loads.grips import Velocity as Velocity
 from .loads.pressure import Filling as Filling
 from .loads.pressure import Pressure as Pressure
+from .loads.rotation import Rotation as Rotation
 from .material.homogeneous import peaks as peaks
 from .material.library import material_from as material_from
 from .material.regions import RegionLaw as RegionLaw

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
 from cyclopts import Parameter
 
 from ..errors import ParameterError
-from ..loads.grips import Grip, Traction
+from ..loads.body_force import BodyForce
+from ..loads.grips import Grip, Traction, Velocity
 from ..loads.pressure import Filling, Pressure
-from ..material.regions import Region, RegionLaw
+from ..material.regions import Region, RegionLaw, by_element
 from ..meshing.sample import file_sample
 from ..results.result import Result
 from ..run.compute import run_case
@@ -19,7 +22,16 @@ from ..run.request import check_options
 from ..scene.case import Case
 from ..scene.options import SAMPLE, Options
 from ..scene.scene import Scene
-from ..scene.tables import cracks_of, grips_of, pressures_of, read_tables, regions_of, tractions_of
+from ..scene.tables import (
+    body_forces_of,
+    cracks_of,
+    grips_of,
+    pressures_of,
+    read_tables,
+    regions_of,
+    tractions_of,
+    velocities_of,
+)
 from ..units import Unit
 
 __all__ = ["custom"]
@@ -37,6 +49,9 @@ def custom(
         tractions: Annotated[Sequence[Traction | Mapping[str, Any]], IN_A_DECK] = (),
         pressures: Annotated[Sequence[Pressure | Mapping[str, Any]], IN_A_DECK] = (),
         fillings: Annotated[Sequence[Filling | Mapping[str, Any]], IN_A_DECK] = (),
+        body_forces: Annotated[Sequence[Mapping[str, Any]], IN_A_DECK] = (),
+        event_at: Annotated[float, SAMPLE, Unit("s")] = math.inf,
+        velocities: Annotated[Sequence[Velocity | Mapping[str, Any]], IN_A_DECK] = (),
         regions: Annotated[Sequence[RegionLaw | Mapping[str, Any]], IN_A_DECK] = (),
         probes: Annotated[Sequence[Mapping[str, Any]], IN_A_DECK] = (),
         cracks: Annotated[Sequence[Mapping[str, Any]], IN_A_DECK] = (),
@@ -70,6 +85,14 @@ def custom(
     fillings
         Cavities into which a fluid is pumped: inflow, or a ramp of points [time, volume], and compliance, volume by
         pressure, of fluid and pump. A plane body counts as 1 mm thick.
+    body_forces
+        Forces per mass, such as weight, on the body or on a region: for x, y, z a rate, or a ramp of points [time,
+        acceleration].
+    event_at
+        Load time at which a dynamic event begins, also where nothing has failed yet [s], >= 0; 0 begins it from the
+        unloaded body, inf at the onset.
+    velocities
+        Of the body, or of a region, as the event begins at `event_at`, for x, y, z.
     regions
         Named sets of elements that are of another material, or of another strength.
     probes
@@ -92,9 +115,10 @@ def custom(
                              f"{faces!r:.80}")
     arguments = {"mesh": mesh, "title": title, "faces": faces, "merge_nodes": merge_nodes,
                  "grips": read_tables("grips", grips), "tractions": read_tables("tractions", tractions),
-                 "pressures": read_tables("pressures", pressures), "fillings": read_tables("fillings", fillings),
-                 "regions": read_tables("regions", regions), "probes": read_tables("probes", probes),
-                 "cracks": read_tables("cracks", cracks)}
+                 **{name: read_tables(name, tables) for name, tables in (
+                     ("pressures", pressures), ("fillings", fillings), ("body_forces", body_forces),
+                     ("regions", regions), ("velocities", velocities), ("probes", probes), ("cracks", cracks))},
+                 "event_at": event_at}
     return run_case(CASE, arguments, options)
 
 
@@ -116,12 +140,16 @@ def _scene(arguments: dict[str, Any], options: Options) -> Scene:
     regions = tuple(Region(law.name, sample.elements(law.name), *law.laws(material, sink_law))
                     for law in regions_of(arguments["regions"]))
     dim = sample.space.dim
+    rho0 = by_element(sample.space.n_elements, material.rho0, regions, lambda region: region.material.rho0)
+    weights = tuple(partial(BodyForce, rho0=rho0, rate=rate, elements=sample.elements(name) if name else None)
+                    for name, rate in body_forces_of(arguments.get("body_forces", ()), dim))
     return Scene(
         case="custom", title=arguments["title"], parameters={**arguments, **options.parameters()}, sample=sample,
         material=material, sink_law=sink_law, controls=options.controls(), regions=regions,
         grips=grips_of(arguments["grips"], dim),
-        tractions=tractions_of(arguments["tractions"], dim), pressures=pressures, probes=tuple(arguments["probes"]),
-        cracks=cracks_of(arguments["cracks"], sample),
+        tractions=tractions_of(arguments["tractions"], dim), loads=weights, pressures=pressures,
+        event_at=arguments.get("event_at", math.inf), velocities=velocities_of(arguments.get("velocities", ()), dim),
+        probes=tuple(arguments.get("probes", ())), cracks=cracks_of(arguments.get("cracks", ()), sample),
         faces=tuple(filter(None, (name.strip() for name in arguments["faces"].split(",")))))
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import textwrap
 from collections.abc import Iterator
+from math import inf
 
 __all__ = ["deck_text", "show"]
 
@@ -19,6 +20,8 @@ EXAMPLES = {
                   'in_crack = true         # in cracks that come from it as well'),
     "fillings": ('[[fillings]]', 'boundary = "inner"', 'inflow = "1 mm^3/s"     # or a ramp of the volume',
                  'compliance = "0.1 mm^3/kPa"'),
+    "body_forces": ('[[body_forces]]', 'y = [["0 s", "0 m/s^2"], ["1 s", "-9.81 m/s^2"]]'),
+    "velocities": ('[[velocities]]', 'region = "ball"         # left out: the body', 'x = "2 m/s"'),
     "regions": ('[[regions]]', 'name = "inclusion"', 'material = "neo-hookean"', 'constants = "mu = 2 MPa"',
                 'phi = "1 MPa"          # also m, bulk_modulus, density'),
     "cracks": ('[[cracks]]', 'name = "slit"',
@@ -69,6 +72,9 @@ def _lines(name: str) -> Iterator[str]:
         yield from _comment(parameter.meaning)
         if parameter.has_tables:
             yield from (f"# {line}" for line in EXAMPLES[parameter.name])
+            continue
+        if parameter.default == inf:  # which has no unit, and another name in JSON
+            yield f"{parameter.name} = inf"
             continue
         default = f"{parameter.default!r} {parameter.unit}" if parameter.unit else parameter.default
         yield f"{parameter.name} = {json.dumps(default)}"

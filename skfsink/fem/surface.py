@@ -7,6 +7,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from ..errors import MeshError, ParameterError, place_text
+from .facets import FACETS, boundary_facets, facets_of
 from .places import Places
 from .quadrature import points, shape_functions
 from .space import Space
@@ -14,7 +15,7 @@ from .space import Space
 __all__ = ["Surface"]
 
 FLAT = 1e-6   # of its size: how far a rim may be from its plane
-_QUAD = (0, 1, 3, 2)  # corners of the unit square on the way round
+_QUAD = (0, 1, 3, 2)  # corners of the unit square on the way round, and back
 
 
 class Surface:
@@ -40,22 +41,14 @@ class Surface:
 
     def __init__(self, space: Space, name: str, nodes: np.ndarray) -> None:
         self.space, self.name = space, name
-        member = np.zeros(space.n_nodes, bool)
-        member[nodes] = True
-        facets, elements, sides = [], [], []
-        outer = {tuple(facet) for facet in np.sort(space.mesh.facets[:, space.mesh.boundary_facets()], axis=0).T}
-        for side, corners in enumerate(_sides(space.dim)):
-            found = space.conn[:, corners]
-            hits = np.flatnonzero(member[found].all(axis=1))
-            hits = hits[[tuple(sorted(facet)) in outer for facet in found[hits].tolist()]] if hits.size else hits
-            facets.append(found[hits])
-            elements.append(hits)
-            sides.append(np.full(hits.size, side))
-        self.facets, self.elements = np.concatenate(facets), np.concatenate(elements)
-        self._sides = np.concatenate(sides)
-        if not self.elements.size:
+        numbers = boundary_facets(space, nodes)
+        if not numbers.size:
             raise MeshError(f"boundary {name!r} is no surface: no facet of the surface of the body has all its nodes "
                             f"in it; name all nodes of a side")
+        found, table = facets_of(space, numbers), FACETS[space.dim]
+        self.elements = found.elements
+        self.facets = found.nodes if space.dim == 2 else found.nodes[:, _QUAD]
+        self._sides = (found.local[:, None] == table).all(axis=2).argmax(axis=1)
 
     # --- means ---
     def places(self) -> tuple[Places, np.ndarray]:
@@ -137,19 +130,6 @@ class Surface:
                 else:
                     total += _flux(corners)
         return total
-
-
-def _sides(dim: int) -> list[list[int]]:
-    """Corners of the sides 2 axis + side of an element on their way round, as :attr:`Surface.facets` has them."""
-    if dim == 2:
-        return [[2, 0], [1, 3], [0, 1], [3, 2]]
-    found = []
-    for axis in range(3):
-        i, j = 1 << (axis + 1) % 3, 1 << (axis + 2) % 3
-        for side in range(2):
-            way = [corner + (side << axis) for corner in (0, i, i + j, j)]
-            found.append(way if side else way[::-1])
-    return found
 
 
 def _flux(corners: np.ndarray) -> float:

@@ -140,6 +140,10 @@ class Body:
         if self.momentum.followers is not self.loading.followers:
             raise ParameterError("the momentum balance has other pressures than the loading: give it "
                                  "`loading.followers`")
+        self.momentum.sliding = self.loading.sliding
+        if self.loading.sliding is not None and self.momentum.contact is not None:
+            raise ParameterError("contact is for boundaries that slide along axes, and one slides on an oblique plane: "
+                                 "turn the body, or leave contact out")
 
     @classmethod
     def of(cls, scene: BodyScene) -> Body:
@@ -185,9 +189,9 @@ class Body:
         return max(wave_speed_at_failure(part.material, law) for part, (_, law) in pairs)
 
     # --- initial cracks ---
-    def begin(self) -> State:
-        """The undeformed body at rest, intact but for initial cracks."""
-        state = State.intact(self.space)
+    def begin(self, state: State | None = None) -> State:
+        """The undeformed body at rest, intact but for initial cracks: an intact `state` with these in it."""
+        state = State.intact(self.space) if state is None else state
         if self.broken.size:
             state.W_max[self.broken] = GONE * np.broadcast_to(self.density.phi, state.W_max.shape)[self.broken]
             state.gamma = self._begun.copy()

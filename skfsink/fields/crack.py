@@ -64,10 +64,23 @@ class Tips:
 
 
 class Plane(NamedTuple):
-    """A plane of symmetry: the axis that is normal to it, and its nodes."""
+    """A plane of symmetry: the axis that is normal to it, or else its unit normal (dim,), and its nodes."""
 
-    axis: int
+    axis: int | np.ndarray
     nodes: np.ndarray
+
+    def height(self, x: np.ndarray, origin: np.ndarray) -> np.ndarray:
+        """Distance of points x (k, dim) from the plane through `origin` (dim,), (k,) [mm]."""
+        if isinstance(self.axis, np.ndarray):
+            return np.abs((x - origin) @ self.axis)
+        distance: np.ndarray = np.abs(x[:, self.axis] - origin[self.axis])
+        return distance
+
+    def within(self, vector: np.ndarray) -> np.ndarray:
+        """The part of a vector (dim,) in the plane."""
+        normal = self.axis if isinstance(self.axis, np.ndarray) else np.eye(vector.size)[self.axis]
+        part: np.ndarray = vector - (vector @ normal) * normal
+        return part
 
 
 class CrackTracker:
@@ -149,7 +162,7 @@ class CrackTracker:
                          label: np.ndarray) -> bool:
         """Whether a piece of the cracked set (`label` of its `nodes`) joins a place of the rim to the image of it."""
         touching = np.unique(label[np.isin(nodes, plane.nodes)])
-        height = np.abs(self.space.X[rim, plane.axis] - self.space.X[plane.nodes[0], plane.axis])
+        height = plane.height(self.space.X[rim], self.space.X[plane.nodes[0]])
         height[np.isin(rim, plane.nodes)] = 0.0
         lowest = np.full(int(place.max(initial=-1)) + 1, np.inf)
         np.minimum.at(lowest, place, height)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from ..errors import ParameterError
 from ..fem.backend import BulkViscosity, Part
@@ -14,6 +15,7 @@ from ..fem.pattern import Pattern
 from ..fem.space import Space
 from ..loads.follower import FollowerLoads
 from ..loads.nodal import NodalLoads
+from ..loads.sliding import SlidingPlanes
 from ..material import GeneralMaterial, Material
 from ..material.regions import Region, by_element, rest_of
 from .contact import Contact
@@ -29,7 +31,7 @@ class Momentum:
     `stiffest`, `viscous_force`, `viscous_tangent`, `lumped_mass` and `consistent_mass` are for these. `potential`, `W`,
     `energy` and `pressed` are of the last `force`, `compression` of the last `viscous_force`. `contact` is set once;
     `book_contact` and `memory` are of what it has seen, and `restore` takes up the last. `pressure_work`,
-    `load_size` and `added_stiffness` are for the load time last given.
+    `load_size`, `added_stiffness` and `skew_stiffness` are for the load time last given.
 
     Parameters
     ----------
@@ -51,6 +53,7 @@ class Momentum:
     rho0: density of the intact solid [t/mm^3], a number, or where materials differ one for each element (ne, 1).
     shear_moduli, shear_wave_speeds: least and greatest of the materials [MPa; m/s].
     contact: the medium between the lips of cracks, if there is to be one; :meth:`force` contains its force.
+    sliding: planes on which nodes slide, if there are any; matrices are constrained to them, forces are not.
     energy: gamma-weighted stored energy at the last evaluation [N mm; N mm/mm in 2D].
     loads: potential -f.u of the dead loads at the last evaluation, in the same units.
     least_J: least J (plane stress: its part in the plane) at a Gauss point with gamma > 0 at the last evaluation.
@@ -82,6 +85,7 @@ class Momentum:
             raise ParameterError("element planestress has no thickness for a pressure on its edges to act on: take "
                                  "jbar, or a dead traction")
         self.contact: Contact | None = None
+        self.sliding: SlidingPlanes | None = None
         self.least_J = 1.0
         self.evaluations = 0
         self._intact = self._mass = self._lumped(np.ones_like(space.w))
@@ -132,6 +136,8 @@ class Momentum:
         if self.dead is not None:
             nodes, e = self.space.conn[self.dead.elements], self.dead.elements
             self.dead.keep(((gamma[nodes] @ self.space.N.T >= self.force_floor) & ~deleted[e, None]).any(axis=1))
+            if self.dead.weighs:
+                self.dead.weigh(self.effective(gamma, deleted))
         if self.followers is not None:
             self.followers.keep(gamma, deleted, self.force_floor)
         taken = self.backend.relax(gamma, deleted, self.force_floor)
@@ -190,8 +196,14 @@ class Momentum:
         """
         lips = None if self.contact is None else self.contact.tangent(u)
         fluids = None if self.followers is None else self.followers.stiffening(u)
+        if fluids is not None and self.sliding is not None:
+            fluids = self.sliding.matrix() @ fluids
         parts = [B for B in (lips, None if fluids is None else fluids[free]) if B is not None]
         return np.hstack(parts) if len(parts) > 1 else parts[0] if parts else None
+
+    def skew_stiffness(self, u: np.ndarray, free: np.ndarray) -> csr_array | None:
+        """The part of the stiffness of pressures that is not symmetric; see :meth:`.FollowerLoads.skew`."""
+        return None if self.followers is None else self.followers.skew(u, free, self.sliding)
 
     def memory(self) -> dict[str, np.ndarray]:
         """What contact and pressures remember beyond density and load time, for a checkpoint."""
@@ -234,12 +246,19 @@ class Momentum:
         self.compression = self.backend.viscous_force(u, v, out)
         return out
 
+    def unheld(self, x: np.ndarray) -> np.ndarray:
+        """Forces or displacements (n, dim) without what planes on which nodes slide take; `x` itself without these."""
+        return x if self.sliding is None else self.sliding.along(x)
+
+    def _constrained(self, pattern: Pattern, data: np.ndarray) -> np.ndarray:
+        return data if self.sliding is None else self.sliding.constrained(pattern, data)
+
     def viscous_tangent(self, pattern: Pattern, u: np.ndarray, v: np.ndarray, compression: float = 0.0) -> np.ndarray:
         """Data of the derivative of that force with `v` on `pattern`, symmetric and nowhere negative [N s/mm].
 
         Elements count as compressed by `compression` at least.
         """
-        return self.backend.viscous_tangent(pattern, (u, v), self.gamma, compression)
+        return self._constrained(pattern, self.backend.viscous_tangent(pattern, (u, v), self.gamma, compression))
 
     @property
     def W(self) -> np.ndarray:
@@ -254,7 +273,7 @@ class Momentum:
         data = self.backend.tangent(pattern, u, self.gamma, convex)
         if self.followers is not None and not convex:
             self.followers.add_stiffness(pattern, u, data)
-        return data
+        return self._constrained(pattern, data)
 
     def stiffest(self, u: np.ndarray, inverse_mass: np.ndarray) -> float:
         """Cheap indicator of the highest frequency squared at `u`, and below it [1/s^2].
@@ -266,7 +285,7 @@ class Momentum:
 
     def consistent_mass(self, pattern: Pattern) -> np.ndarray:
         """Data of the mass matrix of Eq. (28) on `pattern`."""
-        return self.backend.mass(pattern, self.gamma)
+        return self._constrained(pattern, self.backend.mass(pattern, self.gamma))
 
     def lumped_mass(self, floor: float, factors: np.ndarray | None = None) -> np.ndarray:
         """Row sums (n,) [t; t/mm in 2D] of Eq. (28), at least `floor` times those of the intact solid.

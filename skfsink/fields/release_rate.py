@@ -236,10 +236,12 @@ def _check_forces(momentum: Momentum, state: State, domain: _Domain, at: str) ->
         raise ParameterError("an energy release rate knows no contact, and lips of the crack press on each other: take "
                              "a state in which the crack is open")
     elements = domain.elements
-    if momentum.dead is not None:
-        loaded = momentum.dead.nodes[np.any(momentum.dead.values != 0, axis=1)]
-        if np.isin(loaded, momentum.space.conn[elements][domain.q > 0]).any():
-            raise ParameterError(f"{at} has a dead load in it, which feeds in energy there: give a smaller radius")
+    dead, followers, inside = momentum.dead, momentum.followers, momentum.space.conn[elements][domain.q > 0]
+    if dead is not None and np.isin(dead.nodes[np.any(dead.values != 0, axis=1)], inside).any():
+        raise ParameterError(f"{at} has a dead load in it, which feeds in energy there: give a smaller radius")
+    if followers is not None and followers.pressures(state.u).any() and np.isin(followers.nodes, inside).any():
+        raise ParameterError(f"{at} has a pressure in it, which feeds in energy there: give a smaller radius, or a "
+                             f"pressure that is not in_crack")
     for part, rows in parts_of(momentum, elements):
         fibres = fibres_at(part, elements[rows])
         if fibres is not None and fibres.size and np.ptp(fibres, axis=0).max() > 1e-6:

@@ -1,7 +1,12 @@
+from .body_force import BodyForce as BodyForce
+from .curve import Curve as Curve
 from .dead_load import DeadLoad as DeadLoad
 from .grips import Grip as Grip
 from .grips import Ramp as Ramp
+from .grips import Sliding as Sliding
 from .grips import Traction as Traction
+from .grips import Velocity as Velocity
 from .pressure import Filling as Filling
 from .pressure import Pressure as Pressure
+from .rotation import Rotation as Rotation
 from .schedule import Loading as Loading

@@ -86,10 +86,13 @@ class DeadLoad(NodalLoads):
         """Tractions at load time `t` [s], (tractions, dim) [MPa]."""
         return np.array([[v.value(t) if isinstance(v, Ramp) else v * t for v in rate] for rate in self._rates])
 
+    def rates(self, t: float) -> np.ndarray:
+        """Changes of the tractions from load time `t` on, (tractions, dim) [MPa/s]."""
+        return np.array([[v.rate(t) if isinstance(v, Ramp) else v for v in rate] for rate in self._rates])
+
     def rate(self, t: float) -> float:
-        """Fastest change of a traction from load time `t` [s] on [MPa/s]."""
-        rates = [[v.rate(t) if isinstance(v, Ramp) else v for v in rate] for rate in self._rates]
-        return float(np.linalg.norm(rates, axis=1).max())
+        """Fastest change of a traction from load time `t` on [MPa/s]."""
+        return float(np.linalg.norm(self.rates(t), axis=1).max())
 
     def resultant(self, number: int) -> np.ndarray:
         """Force of one of the tractions now, (dim,) [N; N/mm in 2D]."""

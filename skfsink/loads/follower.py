@@ -14,6 +14,7 @@ from ..fem.pattern import Pattern
 from ..fem.space import Space
 from .grips import Ramp
 from .pressure import Filling, Pressure
+from .sliding import SlidingPlanes
 from .wetted import WettedSurface
 
 __all__ = ["FollowerLoads"]
@@ -28,8 +29,8 @@ class FollowerLoads:
 
     Memory: the load time last given to `at`; the facets that bear load, of the density last given to `keep`; the
     displacement last given to `add_force` or `size`, at which the volume below a facet that fails is kept; what `hold`
-    has added to fluids. `pressures`, `work`, `add_stiffness`, `skew`, `stiffening`, `stiffest`, `swept` and `area` are
-    for these; `memory` gives what a checkpoint needs, and `restore` takes it up.
+    has added to fluids. `pressures`, `work`, `add_stiffness`, `skew`, `stiffening`, `stiffest`, `swept`, `area` and
+    `nodes` are for these; `memory` gives what a checkpoint needs, and `restore` takes it up.
 
     Parameters
     ----------
@@ -61,10 +62,19 @@ class FollowerLoads:
         self.areas = self.area(np.zeros_like(space.X))
         self.at(0.0)
 
+    @property
+    def nodes(self) -> np.ndarray:
+        """Nodes of the facets that bear load now, (k,)."""
+        return self._wet.nodes
+
     # --- the loads at a time ---
     def at(self, t: float) -> None:
         """Take the loads of load time `t` [s]."""
         self.values = np.array([c.value(t) if isinstance(c := _course(load), Ramp) else c * t for load in self.loads])
+
+    def rates(self, t: float) -> np.ndarray:
+        """Rates of all loads from load time `t` on, (loads,) [MPa/s; mm^dim/s]."""
+        return np.array([_rate(load, t) for load in self.loads])
 
     def rate(self, t: float) -> float:
         """Fastest change of a given pressure from load time `t` on [MPa/s]; it decides on load increments."""
@@ -158,17 +168,18 @@ class FollowerLoads:
         unknowns: np.ndarray = (local[:, :, None] * dim + np.arange(dim)).reshape(len(local), -1)
         return unknowns
 
-    def skew(self, u: np.ndarray, free: np.ndarray) -> csr_array | None:
+    def skew(self, u: np.ndarray, free: np.ndarray, sliding: SlidingPlanes | None = None) -> csr_array | None:
         """The other part, over the unknowns that are `free` (n*dim,); None where it vanishes.
 
-        It does where the surface is closed, or its rim is held or slides in the planes that close it.
+        It does where the surface is closed, or its rim is held or slides in the planes that close it, be they oblique
+        ones, `sliding`.
         """
-        return self._skew(u, free, self.pressures(u))
+        return self._skew(u, free, sliding, self.pressures(u))
 
-    def check_closed(self, free: np.ndarray) -> None:
+    def check_closed(self, free: np.ndarray, sliding: SlidingPlanes | None = None) -> None:
         """Refuse a filling whose boundary encloses no volume: the rim of a cavity must not move out of its planes.
 
-        `free` is the mask of the unknowns that nothing holds, (n*dim,).
+        `free` is the mask of the unknowns that nothing holds, (n*dim,), but for planes oblique to the axes, `sliding`.
 
         Raises
         ------
@@ -176,17 +187,21 @@ class FollowerLoads:
             There is such a filling.
         """
         for k in self._fillings:
-            if self._skew(np.zeros_like(self.space.X), free, np.eye(len(self.loads))[k]) is not None:
+            if self._skew(np.zeros_like(self.space.X), free, sliding, np.eye(len(self.loads))[k]) is not None:
                 raise ParameterError(f"the boundary {self.loads[k].boundary!r} of a filling encloses no volume: hold "
                                      f"its rim, or let it slide in planes of symmetry, or close it")
 
-    def _skew(self, u: np.ndarray, free: np.ndarray, p: np.ndarray) -> csr_array | None:
+    def _skew(self, u: np.ndarray, free: np.ndarray, sliding: SlidingPlanes | None, p: np.ndarray) -> csr_array | None:
         K = self._tangents(u, p)
         K = 0.5 * (K - K.transpose(0, 2, 1))
         dofs = (self._wet.facets.nodes[:, :, None] * self.space.dim + np.arange(self.space.dim)).reshape(len(K), -1)
         rows = np.repeat(dofs, dofs.shape[1], axis=1).ravel()
         columns = np.tile(dofs, (1, dofs.shape[1])).ravel()
-        matrix = csr_array(coo_array((K.ravel(), (rows, columns)), shape=(free.size,) * 2))[free][:, free]
+        matrix = csr_array(coo_array((K.ravel(), (rows, columns)), shape=(free.size,) * 2))
+        if sliding is not None:
+            P = sliding.matrix()
+            matrix = csr_array(P @ matrix @ P)
+        matrix = matrix[free][:, free]
         matrix.sum_duplicates()
         scale = float(np.abs(K).max(initial=0.0))
         return matrix if scale > 0.0 and float(np.abs(matrix.data).max(initial=0.0)) > 1e-9 * scale else None

@@ -1,15 +1,15 @@
-"""What moves and what pulls a body: grips, dead tractions, and ramps in time."""
+"""What moves, guides and pulls a body: grips, sliding planes, dead tractions, and ramps in time."""
 
 from __future__ import annotations
 
 from bisect import bisect_right
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from ..errors import ParameterError, require
 
-__all__ = ["Grip", "Ramp", "Traction"]
+__all__ = ["Grip", "Ramp", "Sliding", "Traction", "Velocity"]
 
 
 @dataclass(frozen=True)
@@ -59,6 +59,10 @@ class Ramp:
             return 0.0
         return (self.values[i + 1] - self.values[i]) / (self.times[i + 1] - self.times[i])
 
+    def slope(self, t: float) -> float:
+        """Its rate at load time `t` [s] itself; where it has two, at one of :attr:`times`, that from there on."""
+        return self.rate(t)
+
 
 @dataclass(frozen=True)
 class Grip:
@@ -66,6 +70,29 @@ class Grip:
 
     boundary: str
     velocity: tuple[float | Ramp | None, ...]
+
+    @property
+    def moves(self) -> bool:
+        """Whether it moves at some time."""
+        return any(isinstance(value, Ramp) or value for value in self.velocity)
+
+
+@dataclass(frozen=True)
+class Sliding(Grip):
+    """A flat boundary, of any direction, that slides on its plane: held along its normal, free along the plane.
+
+    `velocity` is no argument of it: nothing is moved.
+    """
+
+    velocity: tuple[float | Ramp | None, ...] = field(default=(), init=False)
+
+
+@dataclass(frozen=True)
+class Velocity:
+    """The velocity that a region, or with an empty name the body, has as the event begins, by component [mm/s]."""
+
+    region: str
+    velocity: tuple[float, ...]
 
 
 @dataclass(frozen=True)

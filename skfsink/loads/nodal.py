@@ -6,6 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from .grips import Ramp
+
 __all__ = ["NodalLoads", "Together"]
 
 
@@ -20,11 +22,15 @@ class NodalLoads:
     nodes: at which they act, (k,), each once.
     values: their forces at the time last given to :meth:`at`, (k, dim) [N; N/mm in 2D]; replaced, never changed.
     elements: on which they act, (f,); those that have lost their force bear no load any more.
+    ramps: that they follow; load increments end at their points.
+    weighs: whether they fall with the density, which `weigh` is given then.
     """
 
     nodes: np.ndarray
     values: np.ndarray
     elements: np.ndarray
+    ramps: tuple[Ramp, ...] = ()
+    weighs: bool = False
 
     def at(self, t: float) -> None:
         """Take the loads of load time `t` [s]."""
@@ -37,6 +43,9 @@ class NodalLoads:
     def keep(self, alive: np.ndarray) -> None:
         """Let loads act only on those of `elements` that are `alive` (f,)."""
         raise NotImplementedError
+
+    def weigh(self, gamma: np.ndarray) -> None:
+        """Let the loads be those of material with the relative density `gamma` (ne, nq)."""
 
     # --- energy ---
     def potential(self, u: np.ndarray) -> float:
@@ -62,6 +71,8 @@ class Together(NodalLoads):
         self.loads, self._n_nodes = tuple(loads), n_nodes
         self.nodes = np.unique(np.concatenate([load.nodes for load in self.loads]))
         self.elements = np.concatenate([load.elements for load in self.loads])
+        self.ramps = tuple(ramp for load in self.loads for ramp in load.ramps)
+        self.weighs = any(load.weighs for load in self.loads)
         self._add()
 
     def _add(self) -> None:
@@ -85,4 +96,10 @@ class Together(NodalLoads):
         ends = np.cumsum([load.elements.size for load in self.loads])
         for load, part in zip(self.loads, np.split(alive, ends[:-1])):
             load.keep(part)
+        self._add()
+
+    def weigh(self, gamma: np.ndarray) -> None:
+        """Let the loads be those of material with the relative density `gamma` (ne, nq)."""
+        for load in self.loads:
+            load.weigh(gamma)
         self._add()

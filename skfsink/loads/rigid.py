@@ -16,6 +16,7 @@ from scipy.sparse.csgraph import connected_components
 from ..errors import place_text
 from ..fem.space import Space
 from .schedule import Loading
+from .sliding import SlidingPlanes
 
 __all__ = ["Motion", "free_motions", "moves_as_a_whole", "pieces"]
 
@@ -50,8 +51,11 @@ def pieces(space: Space) -> np.ndarray:
     return np.asarray(label)
 
 
-def free_motions(space: Space, free: np.ndarray, label: np.ndarray | None = None) -> Iterator[Motion]:
-    """The rigid motions left to the body, or to its :func:`pieces`, by the mask `free` (n*dim,) of what is not held."""
+def free_motions(space: Space, free: np.ndarray, label: np.ndarray | None = None,
+                 sliding: SlidingPlanes | None = None) -> Iterator[Motion]:
+    """The rigid motions left to the body, or to its :func:`pieces`, by the mask `free` (n*dim,) of what is not held,
+    and by planes that nodes slide on.
+    """
     label = pieces(space) if label is None else label
     count, held = int(label.max()) + 1, ~free.reshape(space.X.shape)
     size = float(np.ptp(space.X, axis=0).max())
@@ -64,6 +68,9 @@ def free_motions(space: Space, free: np.ndarray, label: np.ndarray | None = None
     joined = csr_array((count, count))
     for k, nodes in enumerate(members):
         grasp = modes[:, nodes][:, held[nodes]]
+        if sliding is not None:
+            inside = np.isin(np.arange(space.n_nodes), nodes)[:, None]
+            grasp = np.concatenate([grasp, sliding.across(modes * inside)], axis=1)
         block = slice(k * nm, (k + 1) * nm)
         stiffness[block, block] += grasp @ grasp.T
     if count > 1:
@@ -74,7 +81,7 @@ def free_motions(space: Space, free: np.ndarray, label: np.ndarray | None = None
         columns = (joined[:, None] * nm + np.arange(nm)).ravel()
         values, vectors = np.linalg.eigh(stiffness[np.ix_(columns, columns)])
         nodes = np.concatenate([members[k] for k in joined])
-        if not held[nodes].any():
+        if not held[nodes].any() and (sliding is None or not np.isin(nodes, sliding.nodes).any()):
             yield Motion(_named(space, label, joined, count), "move", "", unheld=True)
             continue
         null = vectors[:, values < RESISTED * values[-1]].T.reshape(-1, len(joined), nm)
@@ -163,13 +170,22 @@ def moves_as_a_whole(space: Space, loading: Loading, label: np.ndarray) -> bool:
     """Whether grips that move only carry every one of the :func:`pieces` along, and strain none, at all load times."""
     held = ~loading.free.reshape(space.X.shape)
     members = [np.unique(space.conn[label == k]) for k in range(int(label.max()) + 1)]
+    if loading.turns:
+        others = np.setdiff1d(np.flatnonzero(held.any(axis=1)), loading.turns[0].nodes)
+        return len(members) == 1 and not others.size and loading.sliding is None
     moved = False
     for t in (0.0, *loading.knots):
         v = loading.velocity(t)
         moved = moved or bool(v[held].any())
         for nodes in members:
+            whole = np.zeros(space.dim)
             for i in range(space.dim):
                 speeds = v[nodes[held[nodes, i]], i]
                 if speeds.size and np.ptp(speeds) > 1e-12 * np.abs(speeds).max():
+                    return False
+                whole[i] = speeds[0] if speeds.size else 0.0
+            if loading.sliding is not None and whole.any():
+                inside = np.isin(np.arange(space.n_nodes), nodes)[:, None]
+                if np.abs(loading.sliding.across(np.where(inside, whole, 0.0))).max() > 1e-9 * np.abs(whole).max():
                     return False
     return moved

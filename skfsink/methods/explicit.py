@@ -49,7 +49,7 @@ class Explicit:
 
     Parameters
     ----------
-    body: the balances, and what loads it. Where a ramp of its loading has a knot a step ends.
+    body: the balances, and what loads it. A step ends at each corner of its loading.
     controls: options.
 
     Attributes
@@ -71,6 +71,9 @@ class Explicit:
         self.space, self.free = body.space, body.free
         self._free = np.ascontiguousarray(self.free.reshape(-1, self.space.dim))
         self._held: np.ndarray = np.logical_not(self._free.all(axis=1))
+        self._guided = np.flatnonzero(self._held)
+        if self.loading.sliding is not None:
+            self._held[self.loading.sliding.nodes] = True
         self._grip_velocity, self._knot = self.loading.velocity(0.0), np.inf
         self._mass_floor = max(self.controls.mass_floor, 1e-12)  # a node without mass or force stays where it is
         self.interval = SolveInterval(body, self.controls.gamma_every)
@@ -89,7 +92,7 @@ class Explicit:
     def start(self, state: State) -> None:
         """Forces, masses and accelerations of `state`; to be called once before stepping, and after a resume."""
         self.momentum.set_time(state.grip)
-        self._grip_velocity, self._knot = self.loading.velocity(state.grip), self.loading.knot(state.grip)
+        self._grip_velocity, self._knot = self.loading.velocity(state.grip), self.loading.corner(state.grip)
         self.momentum.set_gamma(state.gamma, state.deleted)
         self._set_mass()
         self.reaction = self.momentum.force(state.u)
@@ -115,9 +118,9 @@ class Explicit:
 
     def begin(self, state: State) -> None:
         """Set the body in motion: accelerations from the forces, energies of the start."""
-        np.copyto(state.v, self.loading.velocity(state.grip), where=~self._free)
+        np.copyto(state.v, self.loading.motion(state.grip), where=~self._free)
         self.start(state)
-        np.divide(-self.reaction, self.mass[:, None], out=state.a, where=self._inverse > 0.0)
+        np.divide(-self.momentum.unheld(self.reaction), self.mass[:, None], out=state.a, where=self._inverse > 0.0)
         state.a[self._inverse == 0.0] = 0.0
         state.ledger.initial = state.ledger.elastic = self._elastic
         state.ledger.kinetic, state.ledger.loads = self._kinetic(state), self.momentum.loads
@@ -148,6 +151,8 @@ class Explicit:
                 self.length.give_up(state, self._next[1])
         if state.grip == self._knot:
             self._turn(state)
+        elif self.loading.smooth:
+            self._follow(state)
         self._since_gamma += 1
         if self._since_gamma >= self.interval.steps(self.dt):
             self._since_gamma = 0
@@ -163,13 +168,16 @@ class Explicit:
         pressures = None if followers is None else followers.values
         self.momentum.set_time(grip)
         (u, v, a), du = self._next, self._du
-        move((state.u, state.v, state.a), self._moving, self._grip_velocity, dt, (u, v, du))
+        pace = self.loading.mean(state.grip, grip, dt) if self.loading.smooth else self._grip_velocity
+        move((state.u, state.v, state.a), self._moving, pace, dt, (u, v, du))
         force = self.momentum.force(u, self._spare)
         viscous = self._viscous
         if viscous is not None:
-            new_viscous = self.momentum.viscous_force(u, v, self._spare_viscous)
+            speeds = np.where(self._free, v, pace) if self.loading.smooth else v
+            new_viscous = self.momentum.viscous_force(u, speeds, self._spare_viscous)
             force += new_viscous
-        trapezoid, held, kinetic, swing = kick((v, state.a, a), self._inverse, self.mass, (old, force), du, dt)
+        net = self.momentum.unheld(force)
+        trapezoid, held, kinetic, swing = kick((v, state.a, a), self._inverse, self.mass, (old, net), du, dt)
         ledger = state.ledger
         elastic, pressed = self.momentum.energy, self.momentum.pressed
         energy_fed_in = dt * dt / 8 * swing + (elastic - self._elastic) + (pressed - self._pressed) - trapezoid
@@ -180,7 +188,8 @@ class Explicit:
         present, initial = elastic + pressed + kinetic, ledger.initial
         energy = max(abs(initial), present, self.body.least_energy)
         if viscous is not None:
-            work = viscous_work((viscous, new_viscous), (-self.mass[:, None] * state.a, force), self._inverse, du, dt)
+            drags = self.momentum.unheld(viscous), self.momentum.unheld(new_viscous)
+            work = viscous_work(drags, (-self.mass[:, None] * state.a, net), self._inverse, du, dt)
             energy_fed_in += work
         if dead is not None or followers is not None:
             initial = max(abs(initial), present)
@@ -210,12 +219,22 @@ class Explicit:
         return True
 
     def _turn(self, state: State) -> None:
-        """At a knot: grips take their new velocities at once; what that needs is their work."""
-        self._grip_velocity, self._knot = self.loading.velocity(state.grip), self.loading.knot(state.grip)
+        """At a corner: grips take their new velocities at once; what that needs is their work."""
+        self._grip_velocity, self._knot = self.loading.motion(state.grip), self.loading.corner(state.grip)
         before = state.ledger.kinetic
         np.copyto(state.v, self._grip_velocity, where=~self._free)
         state.ledger.kinetic = self._kinetic(state)
         state.ledger.work += state.ledger.kinetic - before
+
+    def _follow(self, state: State) -> None:
+        """After a step on a curve: the same, of the nodes that are held alone."""
+        nodes = self._guided
+        before, held = state.v[nodes], ~self._free[nodes]
+        after = np.where(held, self.loading.motion(state.grip)[nodes], before)
+        gained = float(self.mass[nodes] @ (half_square(after) - half_square(before)))
+        state.v[nodes] = after
+        state.ledger.kinetic += gained
+        state.ledger.work += gained
 
     def update_density(self, state: State) -> None:
         """Solve for gamma from the history, book what the sink takes, delete failed elements, and debris they leave."""

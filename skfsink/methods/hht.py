@@ -47,7 +47,7 @@ class HHT:
 
     Parameters
     ----------
-    body: the balances, and what loads it. Where a ramp of its loading has a knot a step ends.
+    body: the balances, and what loads it. A step ends at each corner of its loading.
     controls: options.
     to_onset: in loading, steps are long, and near the limit load what takes iterations is that gamma follows slowly:
         factors are kept for it, and a step in which it runs away is cut at once, without a warning.
@@ -93,13 +93,13 @@ class HHT:
 
     def start(self, state: State) -> None:
         """Forces and masses of `state`; after a resume :meth:`restore` does it."""
-        self._grip_velocity, self._knot = self.loading.velocity(state.grip), self.loading.knot(state.grip)
+        self._grip_velocity, self._knot = self.loading.velocity(state.grip), self.loading.corner(state.grip)
         self.momentum.set_time(state.grip)
         self.momentum.set_gamma(state.gamma, state.deleted)
         force, viscous = self._forces(state)
         self._loads, self._pressures = self._dead_loads, self._pressures_now
-        self._now = Balance(force, -force.ravel()[self.free], self.momentum.gamma, self.momentum.W,
-                            self.inertia.matrix(), self.inertia.places(), viscous)
+        self._now = Balance(force, -self.momentum.unheld(force).ravel()[self.free], self.momentum.gamma,
+                            self.momentum.W, self.inertia.matrix(), self.inertia.places(), viscous)
 
     def _forces(self, state: State) -> tuple[np.ndarray, np.ndarray | None]:
         """Internal and viscous force of a state less the loads, and the viscous one, None without viscosity."""
@@ -111,7 +111,7 @@ class HHT:
 
     def begin(self, state: State) -> None:
         """Set the body in motion: accelerations from the forces, energies of the start."""
-        state.v[self._held] = self.loading.velocity(state.grip)[self._held]
+        state.v[self._held] = self.loading.motion(state.grip)[self._held]
         self.start(state)
         self.solver.factorize(self._now.mass)
         state.a[...] = 0.0
@@ -142,7 +142,10 @@ class HHT:
             end = min(state.grip + self.dt, self._knot)
             dt = self.dt if end < self._knot else end - state.grip
             trial = Trial(self.scheme, state, self._now, dt, end)
-            trial.predict(self._grip_velocity, self._rate)
+            if self.loading.smooth:
+                trial.predict(self.loading.mean(state.grip, end, dt), self._rate, self.loading.motion(end))
+            else:
+                trial.predict(self._grip_velocity, self._rate)
             accepted = trial.iterate()
             self.iterations += trial.corrections
             if accepted and self._accept(state, trial):
@@ -213,8 +216,8 @@ class HHT:
         state.step += 1
         self._bury(state, new)
         if trial.end == self._knot:
-            self._grip_velocity, self._knot = self.loading.velocity(trial.end), self.loading.knot(trial.end)
-            state.v[self._held] = self._grip_velocity[self._held]
+            self._grip_velocity, self._knot = self.loading.velocity(trial.end), self.loading.corner(trial.end)
+            state.v[self._held] = self.loading.motion(trial.end)[self._held]
             if self.momentum.is_viscous:
                 force, viscous = self._forces(state)
                 self._now = self._now._replace(force=force, viscous=viscous)

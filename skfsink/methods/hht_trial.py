@@ -77,12 +77,17 @@ class Trial:
         self.momentum, self._free = scheme.body.momentum, scheme.body.free
         self.density = Density(state.gamma, state.sink)
         self.viscous: np.ndarray | None = None
+        self._end_velocity: np.ndarray | None = None
         self.corrections, self.cracked = 0, False
         self._correction = self._change = np.inf  # the last ones of displacement [mm] and gamma
         self._settled, self._growing = scheme.controls.coupling == "single", 0
 
-    def predict(self, grip_velocity: np.ndarray, rate: np.ndarray) -> None:
-        """First guess, with the grips at `grip_velocity` (n, dim) [mm/s]; `rate` is du/dt of the step before."""
+    def predict(self, grip_velocity: np.ndarray, rate: np.ndarray, end_velocity: np.ndarray | None = None) -> None:
+        """First guess, with the grips at `grip_velocity` (n, dim) [mm/s]; `rate` is du/dt of the step before.
+
+        `end_velocity` is that of the grips at the end of the step, where it is another one than at its beginning.
+        """
+        self._end_velocity = end_velocity
         c, dt, state = self.scheme.controls, self.dt, self.state
         self.momentum.set_time(self.end)
         self.momentum.set_gamma(state.gamma, state.deleted, medium=False)
@@ -122,11 +127,13 @@ class Trial:
 
     @property
     def velocity(self) -> np.ndarray:
-        """Velocity at the end by Newmark's formula (n, dim); what is held moves as at the beginning."""
+        """Velocity at the end by Newmark's formula (n, dim); what is held moves as the grips do then."""
         free, g = self._free, self.scheme.controls.newmark_gamma
         a0, a1 = self.state.a.ravel()[free], self.a.ravel()[free]
         v = self.state.v.copy()
         v.reshape(-1)[free] = self.state.v.ravel()[free] + self.dt * ((1 - g) * a0 + g * a1)
+        if self._end_velocity is not None:
+            np.copyto(v, self._end_velocity, where=self.scheme.held)
         return v
 
     def _residual(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -137,7 +144,8 @@ class Trial:
             self.viscous = self.momentum.viscous_force(self.u, self.velocity)
             self.force += self.viscous
         inertia = self.scheme.inertia.times(self.mass, self.a.ravel()[self._free])
-        self.weighted = ((1 + alpha) * self.force - alpha * self.old.force).ravel()[self._free]
+        weighted = self.momentum.unheld((1 + alpha) * self.force - alpha * self.old.force)
+        self.weighted = weighted.ravel()[self._free]
         whole = body.space.lump(self.momentum.gamma) > 1e-3 * body.density.load
         live = np.repeat(whole, body.space.dim)[self._free]
         if not live.any():

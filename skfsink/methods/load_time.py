@@ -44,8 +44,22 @@ class LoadTime:
         return self.way(t) * self.longest(t) if self.loading.knots else t
 
     def grown(self, t: float, share: float) -> float:
-        """The load time at which the load has grown by `share` since load time `t` [s]."""
-        return t + share * self.age(t) if self.loading.knots else t * (1.0 + share)
+        """The load time at which the load has grown by `share` since load time `t` [s].
+
+        No later than the next knot at which something that moves turns back, or from which on nothing moves.
+        """
+        if not self.loading.knots:
+            return t * (1.0 + share)
+        longest, end = self.longest(t), t + share * self.age(t)
+        left = share * self.way(t)  # in the largest increments
+        rates = self.loading.rates(t)
+        while end > (knot := self.loading.knot(t)):
+            left -= (knot - t) / longest
+            longest, following = self.longest(knot), self.loading.rates(knot)
+            if longest == np.inf or (following * rates < 0.0).any():
+                return knot
+            t, end, rates = knot, knot + left * longest, np.where(following == 0.0, rates, following)
+        return end
 
     def end(self, t: float, increment: float) -> float:
         """Load time after an increment from `t` on: no later than the next knot, which is hit exactly [s]."""

@@ -85,7 +85,7 @@ class Newton:
         last, length, modified = np.inf, 1.0, False
         pulled = momentum.load_size(u)
         for _ in range(most):
-            r = force.ravel()[self.free]
+            r = momentum.unheld(force).ravel()[self.free]
             error = float(np.linalg.norm(r[live]) / (np.linalg.norm(force) + self._least_force + pulled))
             if error <= tolerance:
                 return u, force
@@ -102,6 +102,7 @@ class Newton:
                 else:
                     d, fresh = self._direction(u, r)
                 step.reshape(-1)[self.free] = d
+                step = momentum.unheld(step)
                 length, force = self._search(u, step, float(r @ d), energy, lowest)
                 if length > 0.0:
                     break
@@ -122,7 +123,8 @@ class Newton:
         eps = 1e-6 * float(self.space.h.min()) / (np.abs(move).max() + 1e-300)
         pull = (self.momentum.force(u + eps * move) - self.momentum.force(u - eps * move)) / (2 * eps)
         d = np.zeros(u.size)
-        d[self.free], _ = self._direction(u, (self.momentum.force(u) + pull).ravel()[self.free], 1e-3)
+        net = self.momentum.unheld(self.momentum.force(u) + pull)
+        d[self.free], _ = self._direction(u, net.ravel()[self.free], 1e-3)
         return u + move + d.reshape(u.shape)
 
     def release(self) -> None:
@@ -138,8 +140,7 @@ class Newton:
     def _direction(self, u: np.ndarray, r: np.ndarray, tolerance: float = INEXACT) -> tuple[np.ndarray, bool]:
         """A step that lowers the residual force `r` at `u`, and whether the factors behind it are those of `u`."""
         data = self.momentum.tangent(self.pattern, u)
-        added, followers = self.momentum.added_stiffness(u, self.free), self.momentum.followers
-        skew = None if followers is None else followers.skew(u, self.free)
+        added, skew = self.momentum.added_stiffness(u, self.free), self.momentum.skew_stiffness(u, self.free)
         if self._kept is not None and added is None and skew is None and self._spent < self.WORTH[self.space.dim - 2]:
             most = self.MOST[self.space.dim - 2]
             d, iterations, met = self.solver.conjugate(data, -r, tolerance, most)

@@ -62,6 +62,7 @@ class StaticLoading:
     OVER = 2.0      # least W/Phi of all points at which a body that has not failed is no body of this theory
     STRETCHED = 20.0  # greatest stretch to which a body is loaded
     STALLED = 0.9  # factor of the changes of gamma a pass from which on the load is within 0.1 % of the onset
+    until = np.inf  #: load time at which loading ends without an onset [s]
     LEAST = 1e-6  # part of the first increment at which a body without load is given up
 
     def __init__(self, body: Body, controls: StaticsControls | None = None) -> None:
@@ -96,7 +97,7 @@ class StaticLoading:
 
         The dead loads are those last given to the momentum balance.
         """
-        return self.newton.predict(u, self.loading.velocity(t) * increment)
+        return self.newton.predict(u, self.loading.mean(t, t + increment, increment) * increment)
 
     # --- both fields ---
     def _settle(self, state: State, u: np.ndarray) -> _Settled | None:
@@ -196,7 +197,7 @@ class StaticLoading:
         self.momentum.set_gamma(state.gamma, state.deleted)
         force = self.momentum.force(state.u)
         W = self.momentum.W
-        while not self._beyond(state, W):
+        while state.grip < self.until and not self._beyond(state, W):
             longest = self.clock.longest(state.grip)
             if longest == np.inf:
                 state.grip = state.time = self.loading.knot(state.grip)
@@ -205,10 +206,10 @@ class StaticLoading:
             self.increment = self.increment or longest
             end = self.clock.end(state.grip, self.increment)
             increment = self.increment if end == state.grip + self.increment else end - state.grip
+            self.momentum.set_gamma(state.gamma, state.deleted)  # the loads of an increment given up were of its gamma
             before = None if dead is None else dead.values
             pressures = None if followers is None else followers.values
             self.momentum.set_time(end)
-            self.momentum.set_gamma(state.gamma, state.deleted)
             try:
                 settled = self._settle(state, self._predict(state.u, increment, state.grip))
             except ConvergenceError:

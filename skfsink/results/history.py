@@ -70,7 +70,7 @@ HISTORY_COLUMNS: dict[str, Column] = {
     "tips": Column("tips that advance", kind=int),
     "branches": Column("branches, advancing or arrested", kind=int),
     "deleted_elements": Column("failed elements, and those of debris that was removed", kind=int),
-    "gamma_min": Column("least relative density of a node; of its beginning with initial cracks"),
+    "gamma_min": Column("least relative density of a node, with initial cracks as a share of that at the start"),
     "dt_s": Column("time step", "s"),
 }
 #: Columns that only runs with pressures have.

@@ -101,6 +101,8 @@ def fastest(scene: Scene, loading: Loading) -> tuple[float, float]:
     softest = min(part.material.shear_modulus for part in scene.parts)
     grips = pull = 0.0
     for t in (0.0, *loading.knots):
+        if t >= scene.event_at:  # from there on nothing is static
+            break
         v = loading.velocity(t)
         parts = [float(np.ptp(v[held[:, i], i])) for i in range(space.dim) if held[:, i].any()]
         grips = max(grips, float(np.linalg.norm(parts)))
@@ -131,14 +133,15 @@ def refuse(scene: Scene) -> None:
     if count > PIECES:
         raise ParameterError(f"the mesh is in {count} pieces that share no side (at most {PIECES}): merge nodes that "
                              f"coincide")
-    for motion in free_motions(space, loading.free, label):
+    for motion in free_motions(space, loading.free, label, loading.sliding):
         if motion.unheld:
             raise ParameterError(f"nothing holds {motion.piece}: its nodes are in no grip, nor joined to a piece that "
                                  f"is held; merge nodes that coincide, or hold it at a boundary")
-    if not any(loading.speed(t) > 0.0 or loading.pull(t) > 0.0 for t in (0.0, *loading.knots)):
+    if not scene.velocities and not any(loading.speed(t) > 0.0 or loading.pull(t) > 0.0
+                                        for t in (0.0, *loading.knots)):
         raise ParameterError("nothing loads the body: all its grips, tractions and pressures are still; give one of "
                              "them a velocity (a rate), or a ramp that rises")
-    if not (scene.tractions or scene.pressures) and moves_as_a_whole(space, loading, label):
+    if not (scene.tractions or scene.pressures or scene.velocities) and moves_as_a_whole(space, loading, label):
         whole = "the body" if count == 1 else f"each of the {count} pieces of the body, which are not joined,"
         raise ParameterError(f"the grips move {whole} as a whole and strain nothing: hold another boundary in the "
                              f"direction of the one that moves{', or merge nodes that coincide' if count > 1 else ''}")
@@ -227,7 +230,7 @@ def warn(scene: Scene, folder: Path) -> None:
     for part in scene.parts:
         _warn_of_material(scene, part)
     loading = scene.loading()
-    motions = [motion for motion in free_motions(space, loading.free) if not motion.unheld]
+    motions = [motion for motion in free_motions(space, loading.free, sliding=loading.sliding) if not motion.unheld]
     if motions:
         log.warning("the grips leave %s%s: it may drift or turn as it is loaded, which displacements and pictures "
                     "show; %s", ", and ".join(f"{m.piece} free to {m.name}" for m in motions[:3]),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
@@ -37,6 +38,8 @@ from .observers.range import check_scene
 from .observers.view import View
 
 __all__ = ["Loaded", "Simulation", "standard_observers"]
+
+log = logging.getLogger(__name__)
 
 
 class Loaded(NamedTuple):
@@ -85,8 +88,9 @@ class Simulation:
         self.body = Body.of(scene)
         self.momentum, self.density, self.free = self.body.momentum, self.body.density, self.body.free
         self.statics = Statics(self.body, scene.controls.statics)
+        self.statics.until = scene.event_at
         self.notes = Notes(display.say, memory.get("warnings", ()))
-        self.state = stored.state if stored else self.body.begin()
+        self.state = stored.state if stored else self.body.begin(State.intact(self.body.space))
         self.costs = Cost(memory.get("cost"))
         self.integrator: Integrator | None = None
         self._from_rest: LoadingFromRest | None = None
@@ -151,6 +155,11 @@ class Simulation:
             self.state = onset.state.copy()
             self.strength.restore(onset.strength)
             self.observers.loading(self.view.at(self.state, self.body.take(self.state)))
+        self.view.on_time = self.state.grip >= self.scene.event_at
+        if not self.view.on_time and self.scene.event_at < np.inf:
+            log.warning("the body begins to fail at load time %.4g s, before event_at = %.4g s: the event begins "
+                        "there, without the velocities asked for; lower event_at, or the load", self.state.grip,
+                        self.scene.event_at)
         self.observers.onset(self.view.at(self.state, self.momentum.force(self.state.u)))
         if onset is None:
             save_state(self.folder / self.ONSET, self.scene.fingerprint, self.state)
@@ -166,17 +175,24 @@ class Simulation:
             view.increment = loading.increment
             self.observers.loading(view.at(state, self.momentum.force(state.u), way=self.statics.clock.way(state.grip)))
             self.observers.pause(view)
+        if state.grip >= self.scene.event_at:  # whether anything moved up to there or not
+            self.statics.unfailed = ""
         self.costs.lap("loading")
 
     def _begin_event(self) -> None:
         """Start a new ledger at the onset, from rest just past it unless the body has come there in motion."""
         state, overshoot = self.state, 0.0 if self._from_rest else self.scene.controls.overshoot
-        followers = self.momentum.followers
-        pressures = None if followers is None else (1.0 + overshoot) * followers.pressures(state.u)
-        state.begin_event(overshoot, self.statics.clock.grown(state.grip, overshoot))
-        if followers is not None and pressures is not None:
-            followers.at(state.grip)
-            followers.hold(state.u, pressures)
+        if self.view.on_time:
+            state.begin_event(0.0, state.grip)
+        else:
+            followers = self.momentum.followers
+            pressures = None if followers is None else (1.0 + overshoot) * followers.pressures(state.u)
+            state.begin_event(overshoot, self.statics.clock.grown(state.grip, overshoot))
+            if followers is not None and pressures is not None:
+                followers.at(state.grip)
+                followers.hold(state.u, pressures)
+        if self.view.on_time:
+            state.v[...] = self.momentum.unheld(self.scene.initial_velocity())
         reaction = self.body.take(state)
         if self.scene.controls.analysis == "quasistatic":
             state.ledger.elastic, state.ledger.loads = self.momentum.energy, self.momentum.loads
@@ -187,7 +203,8 @@ class Simulation:
                 self.costs.factorisations += self.integrator.factorisations
             self._make_integrator().begin(state)
         self.observers.begin(self.view.at(state, reaction, "begin"))
-        self.display.say(onset_text(self.onset.figures))
+        self.display.say(f"the event begins at load time {state.grip:.4g} s" if self.view.on_time else
+                         onset_text(self.onset.figures))
 
     def _make_integrator(self) -> Integrator:
         c = self.scene.controls

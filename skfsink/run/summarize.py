@@ -70,7 +70,8 @@ def summarize(scene: Scene, simulation: Simulation) -> dict[str, Any]:
                    **{name: getattr(ledger, name) for name in OPTIONAL_TERMS if name not in without},
                    **({} if simulation.momentum.followers is None else
                       {"pressure_work": onset.get("pressure_work", 0.0) + ledger.pressure_work}),
-                   "balance_error_relative": max(balances, default=0.0) / onset["elastic_energy"] if onset else None},
+                   "balance_error_relative": max(balances, default=0.0) / ledger.scale(onset["elastic_energy"])
+                   if onset else None},
         **({"cracks": crack_summary(scene, body)} if scene.cracks else {}),
         "fragments": fragment_summary(simulation.body, state, scene.sink_law.length_scale),
         "quantities": measured(scene, simulation), "model": dict(scene.model_choice) or None,

@@ -8,7 +8,7 @@
     density = "1433 kg/m^3"
     mesh = "coarse"              # or a mesh file, sought from the deck's folder
 
-A `custom` scene also has tables [[grips]], [[tractions]] and [[regions]] (see :mod:`.tables`).
+A `custom` scene also has tables [[grips]], [[tractions]], [[body_forces]] and [[regions]] (see :mod:`.tables`).
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from .options import Options
 from .registry import CASES, find_case
 from .scene import Scene
 from .stored import TABLES, tables_beside
+from .tables import beside
 
 __all__ = ["Deck", "read_deck"]
 
@@ -99,7 +100,7 @@ def read_deck(path: str | Path) -> Deck:
     except (OSError, ValueError, RecursionError) as error:
         raise ParameterError(f"{path} is no deck: {first_line(error)}") from None
     try:
-        deck = _deck(data)
+        deck = _deck({key: beside(value, path.parent) if key in TABLES else value for key, value in data.items()})
     except ParameterError as error:
         raise ParameterError(f"{path}: {error}") from None
     if Path(mesh := deck.parameters.get("mesh", "")).suffix:

@@ -17,8 +17,8 @@ from .scene import Scene
 __all__ = ["made_in_python"]
 
 #: parts of a scene that decide results
-PARTS = ("material", "sink_law", "regions", "grips", "rollers", "tractions", "pressures", "loads", "faces", "whole",
-         "probes", "cracks")
+PARTS = ("material", "sink_law", "regions", "grips", "rollers", "tractions", "pressures", "loads", "event_at",
+         "velocities", "faces", "whole", "probes", "cracks")
 
 
 def made_in_python(scene: Scene, case: Case) -> tuple[str, ...]:

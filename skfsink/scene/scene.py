@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import MeshError, ParameterError
+from ..errors import MeshError, ParameterError, require
 from ..fem.backends import backend
 from ..fem.elements import check_element
 from ..fem.space import Space
 from ..fields.fragments import joined
-from ..loads.grips import Grip, Ramp, Traction
+from ..loads.grips import Grip, Ramp, Traction, Velocity
 from ..loads.nodal import NodalLoads
 from ..loads.pressure import Filling, Pressure
 from ..loads.schedule import Loading
@@ -48,6 +48,9 @@ class Scene:
     pressures: pressures that follow the surface, given or of a fluid; without a grip that moves and a traction, the
         first one is the load that is reported.
     loads: dead loads of other kinds, each made from the spaces by a function or an object that is called.
+    event_at: load time at which a dynamic event begins, also where nothing has failed yet [s], >= 0; 0 begins it from
+        the unloaded body. It begins at the onset if that comes first.
+    velocities: that the body, or regions of it, have then; what is held moves as its grip does.
     regions: elements of other materials than `material`; no element is in two.
     cracks: elements that are broken from the start, so that the mesh need not have the crack.
     faces: in three dimensions, the surfaces of a sheet along which a crack runs; they are no edges it arrives at.
@@ -78,6 +81,8 @@ class Scene:
     tractions: tuple[Traction, ...] = ()
     pressures: tuple[Pressure | Filling, ...] = ()
     loads: tuple[Callable[[Space], NodalLoads], ...] = ()
+    event_at: float = np.inf
+    velocities: tuple[Velocity, ...] = ()
     regions: tuple[Region, ...] = ()
     cracks: tuple[InitialCrack, ...] = ()
     faces: tuple[str, ...] = ()
@@ -105,11 +110,12 @@ class Scene:
         _ = self.parts
         self._check_cracks()
         loading = self.loading()
-        if self.controls.start == "rest" and (loading.knots or loading.dead or loading.followers):
+        if self.controls.start == "rest" and (loading.knots or loading.dead or loading.followers or loading.turns):
             what = ("tractions" if self.tractions else "dead loads" if loading.dead else
-                    "pressures" if loading.followers else "ramps")
+                    "pressures" if loading.followers else "ramps" if loading.knots else "a grip that turns")
             raise ParameterError(f"start rest is for grips of constant velocity; this scene has {what}: take start "
                                  f"onset")
+        self._check_beginning()
         if self.controls.start == "rest" and loading.speed(0.0) == 0.0:
             raise ParameterError("start rest needs a grip that moves; all of them are still: give one a velocity, or "
                                  "take start onset")
@@ -144,6 +150,35 @@ class Scene:
         """Numbers of the elements of initial cracks whose lips are whole, ascending."""
         cuts = [crack.elements for crack in self.cracks if crack.lips == "whole"]
         return np.unique(np.concatenate([np.zeros(0, np.int64), *cuts]))
+
+    def _check_beginning(self) -> None:
+        """Refuse a time of the event, and velocities then, that cannot be (ParameterError, MeshError)."""
+        if self.event_at != np.inf:
+            require("event_at", self.event_at, "s", low=0)
+        if self.event_at == np.inf and not self.velocities:
+            return
+        what = "velocities are" if self.event_at == np.inf else "event_at is"
+        if self.controls.analysis != "dynamic" or self.controls.start != "onset":
+            raise ParameterError(f"{what} for analysis dynamic with start onset; got analysis "
+                                 f"{self.controls.analysis}, start {self.controls.start}")
+        if self.event_at == np.inf:
+            raise ParameterError("velocities are those at the load time event_at: give it, 0 s for the unloaded body")
+        for velocity in self.velocities:
+            if len(velocity.velocity) != self.sample.space.dim:
+                raise ParameterError(f"velocity of {velocity.region or 'the body'} must have {self.sample.space.dim} "
+                                     f"components, as the mesh; got {len(velocity.velocity)}")
+            for value in velocity.velocity:
+                require(f"velocity of {velocity.region or 'the body'}", value, "mm/s")
+        self.initial_velocity()
+
+    def initial_velocity(self) -> np.ndarray:
+        """Velocity of the nodes as the event begins, (n, dim) [mm/s]; later ones of `velocities` replace earlier ones.
+        """
+        space, v = self.sample.space, np.zeros_like(self.sample.space.X)
+        for velocity in self.velocities:
+            elements = self.sample.elements(velocity.region) if velocity.region else np.arange(space.n_elements)
+            v[np.unique(space.conn[elements])] = velocity.velocity
+        return v
 
     @property
     def space(self) -> Space:
@@ -180,7 +215,7 @@ class Scene:
         return Loading(self.sample.space, [(nodes(grip.boundary), grip) for grip in (*self.grips, *self.rollers)],
                        [(nodes(traction.boundary), traction) for traction in self.tractions],
                        [make(self.sample.space) for make in self.loads],
-                       [(nodes(load.boundary), load) for load in self.pressures])
+                       [(nodes(load.boundary), load) for load in self.pressures], self.event_at)
 
     def constraints(self) -> tuple[np.ndarray, np.ndarray]:
         """Mask of the free degrees of freedom (n*dim,) and velocity of the held ones at first (n, dim) [mm/s]."""
@@ -190,7 +225,7 @@ class Scene:
     @property
     def moving(self) -> Grip | None:
         """The first grip that moves at some time, None if there is none."""
-        return next((grip for grip in self.grips if any(isinstance(v, Ramp) or v for v in grip.velocity)), None)
+        return next((grip for grip in self.grips if grip.moves), None)
 
     @property
     def opposite(self) -> Grip | None:
@@ -202,7 +237,7 @@ class Scene:
         """Speed at which the grips part at first [mm/s]."""
         velocity = np.zeros((2, self.sample.space.dim))
         for row, grip in zip(velocity, (self.moving, self.opposite)):
-            if grip is not None:
+            if grip is not None and grip.velocity:
                 row[:] = [v.rate(0.0) if isinstance(v, Ramp) else v or 0.0 for v in grip.velocity]
         return float(np.linalg.norm(velocity[0] - velocity[1]))
 
@@ -222,4 +257,5 @@ class Scene:
                        tuple(backend(controls.kernels)), self.material, self.sink_law, self.regions, self.grips,
                        self.rollers, self.tractions, self.loads, self.faces, self.whole,
                        *((self.pressures,) if self.pressures else ()),
-                       *([self.broken, self.cut] if self.cracks else [])])
+                       *([self.broken, self.cut] if self.cracks else []),
+                       *([] if self.event_at == np.inf else [self.event_at, self.velocities])])

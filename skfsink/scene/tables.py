@@ -3,102 +3,41 @@
     [[grips]]                                   [[tractions]]                  [[regions]]
     boundary = "top"                            boundary = "right"             name = "inclusion"
     x = 0                                       x = "10 kPa/s"                 material = "neo-hookean"
-    y = "1e-3 mm/s"                                                            constants = "mu = 2 MPa"
-    z = [["0 s", "0 mm"], ["10 s", "0.2 mm"]]                                  phi = "1 MPa"
+    y = "1e-3 mm/s"    # or: normal = 0                                        constants = "mu = 2 MPa"
+    z = [["0 s", "0 mm"], ["10 s", "0.2 mm"]]  # or "points.csv"               phi = "1 MPa"
 
-    [[pressures]]                               [[fillings]]
-    boundary = "inner"                          boundary = "inner"
-    value = "16 kPa"                            inflow = "1 mm^3/s"
-    in_crack = true                             compliance = "0.1 mm^3/kPa"
-    [[probes]]                                  what is followed: see `skfsink.run.observers`
-    name = "tip"
-    kind = "point"
-    position = ["1 mm", "2 mm"]
+    [[pressures]]                               [[fillings]]                   [[probes]]
+    boundary = "inner"                          boundary = "inner"             name = "tip"
+    value = "16 kPa"                            inflow = "1 mm^3/s"            kind = "point"
+    in_crack = true                             compliance = "0.1 mm^3/kPa"    position = ["1 mm", "2 mm"]
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from functools import partial
-from numbers import Real
+from pathlib import Path
 from typing import Annotated, Any, get_type_hints
 
 from ..errors import ParameterError, require
-from ..loads.grips import Grip, Ramp, Traction
+from ..loads.grips import Grip, Ramp, Sliding, Traction, Velocity
 from ..loads.pressure import Filling, Pressure
+from ..loads.rotation import Rotation
 from ..material import MATERIALS, own_constants
 from ..material.regions import RegionLaw, one_bulk_modulus
 from ..meshing.cracks import InitialCrack, crack_along, crack_of_elements
 from ..meshing.sample import Sample
-from ..units import Unit, number_in
+from ..units import Unit
+from .course_file import SUFFIX
+from .marks import MOST, Course, Place, PressureCourse, Still, Vector, Way, plain
 from .typed import Mistake, Record
 
-__all__ = ["cracks_of", "grips_of", "pressures_of", "read_tables", "regions_of", "tractions_of"]
+__all__ = ["beside", "body_forces_of", "cracks_of", "grips_of", "pressures_of", "read_tables", "regions_of",
+           "tractions_of", "velocities_of"]
 
 AXES = ("x", "y", "z")
-MOST = 1000  # tables of a kind, points of a ramp
-RISE = 1.0   # load time [s] in which a pressure that is given by its value rises to it
-
-
-@dataclass(frozen=True)
-class Course:
-    """Mark in the annotation of a component: a number in the unit `rate`, or a ramp of points [time, value in `unit`].
-    """
-
-    rate: str
-    unit: str
-
-    def read(self, value: Any) -> float | list[list[float]]:
-        """The component in plain numbers; the ParameterError is to follow its name."""
-        if not isinstance(value, list | tuple):
-            return require("", number_in("", value, self.rate), self.rate)
-        if len(value) > MOST or not all(isinstance(point, list | tuple) and len(point) == 2 for point in value):
-            raise ParameterError(f": a ramp has 2 to {MOST} points [time, value]; got {value!r:.80}")
-        times, values = ([require("", number_in("", point[i], unit), unit) for point in value]
-                         for i, unit in enumerate(("s", self.unit)))
-        try:
-            return _plain(Ramp(tuple(times), tuple(values)))
-        except ParameterError as error:
-            raise ParameterError(f": {error}") from None
-
-
-@dataclass(frozen=True)
-class PressureCourse(Course):
-    """The same for a pressure: a number is its value in the `unit`, to which it rises in the first second."""
-
-    def read(self, value: Any) -> list[list[float]]:
-        """The ramp in plain numbers."""
-        if not isinstance(value, list | tuple):
-            value = [[0.0, 0.0], [RISE, require("", number_in("", value, self.unit), self.unit)]]
-        ramp = super().read(value)
-        assert isinstance(ramp, list)
-        return ramp
-
-
-@dataclass(frozen=True)
-class Place:
-    """Mark in the annotation of a point: a list of coordinates [mm]."""
-
-    def read(self, value: Any) -> list[float]:
-        """The point in plain numbers; the ParameterError is to follow its name."""
-        if not isinstance(value, list | tuple) or len(value) not in (2, 3):
-            raise ParameterError(f" must be 2 or 3 coordinates [x, y, z]; got {value!r:.80}")
-        return [require("", number_in("", x, "mm"), "mm") for x in value]
-
-
-@dataclass(frozen=True)
-class Way:
-    """Mark in the annotation of a list of points."""
-
-    def read(self, value: Any) -> list[list[float]]:
-        """The points in plain numbers; the ParameterError is to follow its name."""
-        if not isinstance(value, list | tuple) or not 2 <= len(value) <= MOST:
-            raise ParameterError(f" must be 2 to {MOST} points [x, y, z]; got {value!r:.80}")
-        try:
-            return [Place().read(point) for point in value]
-        except ParameterError as error:
-            raise ParameterError(f": a point{error}") from None
+SINGULAR = {"body_forces": "body force", "velocities": "velocity"}
 
 
 def _message(kind: str, mistake: Mistake, table: Any) -> str:
@@ -109,24 +48,30 @@ def _message(kind: str, mistake: Mistake, table: Any) -> str:
         return f"{kind}: {mistake.field!r} is none of {', '.join(TYPES[kind])}"
     if mistake.field == key:
         return f"{kind}: {key} must be a name; got {mistake.value!r:.80}"
-    return f"{kind.removesuffix('s')} {table[key]}, {mistake.text}"
+    return f"{SINGULAR.get(kind, kind.removesuffix('s'))} {table.get(key, 'of the body')}, {mistake.text}"
 
 
 #: the fields of a table of each kind; the first names it, and those left out are free, zero, or as in the body
 TYPES: Mapping[str, Mapping[str, Any]] = {
-    "grips": {"boundary": str, **dict.fromkeys(AXES, Annotated[list, Course("mm/s", "mm")])},
+    "grips": {"boundary": str, **dict.fromkeys(AXES, Annotated[list, Course("mm/s", "mm")]),
+              "normal": Annotated[float, Still()], "angle": Annotated[list, Course("degree/s", "degree")],
+              "centre": Annotated[list, Vector("mm")], "axis": Annotated[list, Vector("")]},
     "tractions": {"boundary": str, **dict.fromkeys(AXES, Annotated[list, Course("MPa/s", "MPa")])},
     "pressures": {"boundary": str, "value": Annotated[list, PressureCourse("MPa/s", "MPa")],
                   "rate": Annotated[float, Unit("MPa/s")], "in_crack": bool},
     "fillings": {"boundary": str, "inflow": Annotated[list, Course("mm^3/s", "mm^3")],
                  "compliance": Annotated[float, Unit("mm^3/MPa")]},
+    "body_forces": {"region": str, **dict.fromkeys(AXES, Annotated[list, Course("mm/s^3", "mm/s^2")])},
+    "velocities": {"region": str, **dict.fromkeys(AXES, Annotated[float, Unit("mm/s")])},
     "regions": get_type_hints(RegionLaw, include_extras=True),
     "probes": {"name": str, "kind": str, "position": Annotated[list, Place()], "to": Annotated[list, Place()],
                "points": int, "boundary": str, "to_boundary": str, "quantity": str,
                "every": Annotated[float, Unit("s")], "every_passes": int},
     "cracks": {"name": str, "points": Annotated[list, Way()], "lips": str, "width": Annotated[float, Unit("mm")],
                "elements": str}}
-NEEDED = {"fillings": ("boundary", "inflow", "compliance")}
+WITHOUT_NAME = ("body_forces", "velocities")  # kinds whose first field may be left out: they are of the whole body then
+#: fields of a table that may not be left out, where these are others than the first
+NEEDED = {"fillings": ("boundary", "inflow", "compliance"), **dict.fromkeys(WITHOUT_NAME, ())}
 RECORDS = {kind: Record(types, partial(_message, kind), needed=NEEDED.get(kind, (next(iter(types)),)), finite=True)
            for kind, types in TYPES.items()}
 
@@ -149,8 +94,24 @@ def read_tables(kind: str, tables: Any) -> tuple[dict[str, Any], ...]:
             if ("value" in table) == ("rate" in table):
                 raise ParameterError(f"pressure {table['boundary']} must have a value (a pressure, or a ramp of points "
                                      f"[time, pressure]) or a rate; got {'both' if 'rate' in table else 'neither'}")
-    return tuple({name: course for name, course in table.items() if kind != "tractions" or course != 0.0}
-                 for table in read)
+    for table in read if kind == "grips" else ():
+        _one_kind(table)
+    if kind not in ("tractions", *WITHOUT_NAME):
+        return tuple(read)
+    return tuple({name: course for name, course in table.items() if course != 0.0} for table in read)
+
+
+def _one_kind(table: Mapping[str, Any]) -> None:
+    """Refuse a grip that is to do two things at once, or one of them in part (ParameterError)."""
+    name, others = table["boundary"], [axis for axis in AXES if axis in table]
+    if "normal" in table and (others or "angle" in table):
+        raise ParameterError(f"grip {name} has normal and {[*others, 'angle'][0]}: a boundary that slides is held "
+                             f"along its normal alone; hold other components by a second grip on it")
+    if "angle" in table and others:
+        raise ParameterError(f"grip {name} has angle and {others[0]}: a boundary that turns is held in all directions")
+    if ("angle" in table) != ("centre" in table) or ("axis" in table and "angle" not in table):
+        raise ParameterError(f"grip {name} must have angle and centre together, and in space an axis; got "
+                             f"{', '.join(key for key in ('angle', 'centre', 'axis') if key in table)}")
 
 
 def _with_constants(table: Mapping[str, Any]) -> dict[str, Any]:
@@ -170,31 +131,52 @@ def _with_constants(table: Mapping[str, Any]) -> dict[str, Any]:
 # --- objects and their tables ---
 def _table(item: Any) -> Any:
     """The table of a grip, a load or a region; anything else as it is."""
+    if isinstance(item, Sliding):
+        return {"boundary": item.boundary, "normal": 0.0}
+    if isinstance(item, Rotation):
+        return {"boundary": item.boundary, "angle": plain(item.angle), "centre": list(item.centre),
+                **({"axis": list(item.axis)} if item.axis else {})}
     if isinstance(item, Grip):
-        return {"boundary": item.boundary, **{axis: _plain(v) for axis, v in zip(AXES, item.velocity) if v is not None}}
+        return {"boundary": item.boundary, **{axis: plain(v) for axis, v in zip(AXES, item.velocity) if v is not None}}
+    if isinstance(item, Velocity):
+        return {**({"region": item.region} if item.region else {}), **dict(zip(AXES, map(float, item.velocity)))}
     if isinstance(item, Traction):
-        return {"boundary": item.boundary, **{axis: _plain(v) for axis, v in zip(AXES, item.rate) if v != 0.0}}
+        return {"boundary": item.boundary, **{axis: plain(v) for axis, v in zip(AXES, item.rate) if v != 0.0}}
     if isinstance(item, Pressure):
         name = "value" if isinstance(item.rate, Ramp) else "rate"
-        return {"boundary": item.boundary, name: _plain(item.rate), **({"in_crack": True} if item.in_crack else {})}
+        return {"boundary": item.boundary, name: plain(item.rate), **({"in_crack": True} if item.in_crack else {})}
     if isinstance(item, Filling):
-        return {"boundary": item.boundary, "inflow": _plain(item.inflow), "compliance": _plain(item.compliance)}
+        return {"boundary": item.boundary, "inflow": plain(item.inflow), "compliance": plain(item.compliance)}
     if isinstance(item, RegionLaw):
         return {name: value for name, value in asdict(item).items() if value or name in ("name", "material")}
     return item
 
 
-def _plain(course: Any) -> Any:
-    """The component of a table; what is no number stays as it is, for the record to read or refuse."""
-    if isinstance(course, Ramp):
-        return [[float(time), float(value)] for time, value in zip(course.times, course.values)]
-    return float(course) if isinstance(course, Real) and not isinstance(course, bool) else course
+def beside(tables: Any, folder: Path) -> Any:
+    """Tables in which paths of CSV files, relative to the folder of a deck, are absolute; anything else as it is."""
+    if not isinstance(tables, list):
+        return tables
+
+    def path(key: str, value: Any) -> Any:
+        named = key in (*AXES, "angle") and isinstance(value, str) and value.lower().endswith(SUFFIX)
+        return str((folder / value).absolute()) if named else value
+
+    return [{key: path(key, value) for key, value in table.items()} if isinstance(table, Mapping) else table
+            for table in tables]
 
 
 def grips_of(tables: Sequence[Mapping[str, Any]], dim: int) -> tuple[Grip, ...]:
     """The grips of a body of that dimension from their tables."""
-    return tuple(Grip(table["boundary"], _components("grip", table, dim, None))
-                 for table in read_tables("grips", tables))
+    return tuple(_grip(table, dim) for table in read_tables("grips", tables))
+
+
+def _grip(table: Mapping[str, Any], dim: int) -> Grip:
+    if "normal" in table:
+        return Sliding(table["boundary"])
+    if "angle" in table:
+        centre, axis = tuple(table["centre"]), tuple(table.get("axis", ()))
+        return Rotation(table["boundary"], _course(table["angle"]), centre, axis)
+    return Grip(table["boundary"], _components("grip", table, dim, None))
 
 
 def tractions_of(tables: Sequence[Mapping[str, Any]], dim: int) -> tuple[Traction, ...]:
@@ -210,6 +192,18 @@ def pressures_of(pressures: Sequence[Mapping[str, Any]],
                       table.get("in_crack", False)) for table in read_tables("pressures", pressures)]
     return (*given, *(Filling(table["boundary"], _course(table["inflow"]), table["compliance"])
                       for table in read_tables("fillings", fillings)))
+
+
+def body_forces_of(tables: Sequence[Mapping[str, Any]], dim: int) -> tuple[tuple[str, tuple[Any, ...]], ...]:
+    """The region of each body force, "" for the whole body, and its components in a body of that dimension."""
+    return tuple((table.get("region", ""), _components("body force", table, dim, 0.0))
+                 for table in read_tables("body_forces", tables))
+
+
+def velocities_of(tables: Sequence[Mapping[str, Any]], dim: int) -> tuple[Velocity, ...]:
+    """The velocities of a body of that dimension, and of regions of it, as the event begins."""
+    return tuple(Velocity(table.get("region", ""), _components("velocity", table, dim, 0.0))
+                 for table in read_tables("velocities", tables))
 
 
 def regions_of(tables: Sequence[Mapping[str, Any]]) -> tuple[RegionLaw, ...]:
@@ -243,10 +237,11 @@ def _crack(table: Mapping[str, Any], sample: Sample) -> InitialCrack:
 def _components(kind: str, table: Mapping[str, Any], dim: int, missing: float | None) -> tuple[Any, ...]:
     courses = [table.get(axis, missing) for axis in AXES]
     if any(course not in (None, 0.0) for course in courses[dim:]):
-        raise ParameterError(f"{kind} {table['boundary']} has a component z, and the mesh is plane")
-    return tuple(_course(course) for course in courses[:dim])
+        name = table.get("boundary") or table.get("region") or "of the body"
+        raise ParameterError(f"{kind} {name} has a component z, and the mesh is plane")
+    return tuple(map(_course, courses[:dim]))
 
 
 def _course(course: Any) -> Any:
-    """The ramp of a list of points; anything else as it is."""
+    """A ramp of points; a rate, or nothing, as it is."""
     return Ramp(*zip(*course)) if isinstance(course, list) else course

@@ -8,6 +8,7 @@ import numpy as np
 
 from ...fields.state import State
 from ...loads.grips import Ramp
+from ...loads.rotation import Rotation, Turn
 from ...loads.schedule import Loading
 from ...scene.scene import Scene
 
@@ -19,17 +20,23 @@ class Gauge:
 
     The load is the force on the first grip that ever moves, along its motion; of one that follows ramps that is its
     motion in the last stretch of time in which it moves, or away from where it began if it moves back then. The
-    displacement is that of this grip relative to the last other one, in the same direction. Without a grip that moves
-    they are those of the first traction: its force, and the mean displacement of its boundary relative to that of the
-    last other traction, or to the grips. Without these they are those of the first pressure: its force, pressure times
-    the deformed area of its boundary, and the volume by which the boundary has opened over its undeformed area.
+    displacement is that of this grip relative to the last other one, in the same direction. Of a grip that turns they
+    are the moment about its axis over the radius of its outermost node, and the way of this node. Without a grip that
+    moves they are those of the first traction: its force, and the mean displacement of its boundary relative to that of
+    the last other traction, or to the grips. Without these they are those of the first pressure: its force, pressure
+    times the deformed area of its boundary, and the volume by which the boundary has opened over its undeformed area.
     """
 
     def __init__(self, scene: Scene, loading: Loading) -> None:
         self.scene, self.loading = scene, loading
         self._grip = scene.moving
+        self._turn: Turn | None = None
         if self._grip is None:
             self._direction = _unit(_last(scene.tractions[0].rate)) if scene.tractions else np.zeros(0)
+            return
+        if isinstance(self._grip, Rotation):
+            self._turn = loading.turns[[grip for grip in scene.grips if isinstance(grip, Rotation)].index(self._grip)]
+            self._direction = _unit(_last((self._grip.angle,)))
             return
         self._nodes = scene.sample.nodes(self._grip.boundary)
         self._direction = _unit(_last(self._grip.velocity))
@@ -40,6 +47,9 @@ class Gauge:
     def load(self, reaction: np.ndarray, u: np.ndarray) -> float:
         """The load [N; N/mm in 2D] for the `reaction`, force of the body less the loads, at displacement `u` (n, dim).
         """
+        if self._turn is not None:
+            x = self.scene.sample.space.X + u
+            return float(self._direction[0]) * self._turn.moment(x, reaction) / self._turn.radius
         if self._grip is not None:
             return float((reaction[self._nodes] @ self._direction).sum())
         loads, followers = self.loading.tractions, self.loading.followers
@@ -53,6 +63,8 @@ class Gauge:
             if self.loading.tractions is None and (followers := self.loading.followers) is not None:
                 return float(followers.swept(state.u)[0] / followers.areas[0])
             return self._of_traction(state.u)
+        if self._turn is not None:
+            return float(self._direction[0]) * self._turn.turned(state.grip) * self._turn.radius
         if self._clock:
             return state.grip * self.scene.speed
         u = state.u[self._nodes].mean(axis=0)

@@ -80,7 +80,7 @@ class Guard(Observer):
 
     def onset(self, view: View) -> None:
         """Look at the state at the onset."""
-        self.check_onset(view.state)
+        self.check_onset(view.state, fails=not view.on_time)
 
     def unfailed(self, view: View) -> None:
         """Look at the last state of a body that did not fail."""
@@ -129,8 +129,10 @@ class Guard(Observer):
         except SkfsinkError:
             return np.inf
 
-    def check_onset(self, state: State) -> None:
+    def check_onset(self, state: State, *, fails: bool = True) -> None:
         """Look at the state at the onset: where it will crack, and whether it is an equilibrium worth starting from.
+
+        Where nothing `fails` yet, as the event begins, no place is the weakest.
 
         Raises
         ------
@@ -139,9 +141,11 @@ class Guard(Observer):
         """
         begun = self._view.body.since_begun(state)
         loaded = self._loaded(begun)
-        self.scale, self.evenness = state.ledger.elastic, self._even_share(loaded)
-        check_onset(self.scene, begun)
-        self.notch = check_tip(self.space, int(np.argmax(loaded)))
+        self.scale = state.ledger.elastic
+        if fails:
+            self.evenness = self._even_share(loaded)
+            check_onset(self.scene, begun)
+            self.notch = check_tip(self.space, int(np.argmax(loaded)))
         error, allowed = state.ledger.error(state.ledger.elastic), self.scene.controls.balance_tolerance
         if not error <= allowed:
             raise InstabilityError(f"the ledger of the loading is open by {error:.2%} of the stored energy, allowed "

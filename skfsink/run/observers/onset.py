@@ -57,4 +57,5 @@ class Onset(Observer):
                         "work": ledger.work, "pressure_work": ledger.pressure_work,
                         "loading_balance": ledger.balance, **beginning(view.scene, state),
                         "ratio": ratio, "place_of_ratio": place.tolist()}
-        check_beginning(view.scene, state)
+        if not view.on_time:
+            check_beginning(view.scene, state)

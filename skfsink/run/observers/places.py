@@ -18,7 +18,8 @@ from ...fem import indicators
 from ...fields.crack import CrackTracker, Plane
 from ...fields.density import DensitySolver
 from ...fields.state import State
-from ...loads.grips import Grip, Ramp
+from ...loads.grips import Grip, Ramp, Sliding
+from ...loads.sliding import normal_of
 from ...scene.scene import Scene
 
 __all__ = ["beginning", "check_arrival", "check_beginning", "greatest_ratio", "onset_text", "rim_of", "symmetry_planes"]
@@ -68,8 +69,12 @@ def symmetry_planes(scene: Scene) -> list[tuple[str, Plane]]:
         axis, nodes = _normal(scene, name), scene.sample.nodes(name)
         if axis is None or name in scene.faces or held.tolist() != [axis] or not outer[nodes].all():
             continue
-        if all(_stands(grip.velocity[axis]) for grip in grips if grip.boundary == name):
+        if all(isinstance(grip, Sliding) or _stands(grip.velocity[axis]) for grip in grips if grip.boundary == name):
             found.append((name, Plane(axis, nodes)))
+    for name in dict.fromkeys(grip.boundary for grip in grips if isinstance(grip, Sliding)):
+        nodes = scene.sample.nodes(name)
+        if _normal(scene, name) is None and name not in scene.faces and outer[nodes].all():
+            found.append((name, Plane(normal_of(scene.sample.space, nodes, name), nodes)))
     return found
 
 

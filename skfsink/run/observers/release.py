@@ -73,7 +73,8 @@ class EnergyRelease(Observer):
         node = int(np.argmin(view.state.gamma))
         faces = [view.scene.sample.nodes(name) for name in view.scene.faces]
         found = notch_tip(view.body.space, node, ROOT * view.tracker.l, [plane.nodes for plane in self._planes] + faces,
-                          [plane.axis for plane in self._images(view, view.body.space.X[node])])
+                          [plane.axis for plane in self._images(view, view.body.space.X[node])
+                           if isinstance(plane.axis, int)])
         if found is None:
             self._add(view, "onset", 0, view.body.space.X[node], None, math.nan, "it begins to fail at no notch")
         else:
@@ -124,14 +125,14 @@ class EnergyRelease(Observer):
                     direction = direction - (direction @ front) * front
                 images = self._images(view, tip)
                 for plane in images:
-                    direction[plane.axis] = 0.0
+                    direction = plane.within(direction)
                 rate = energy_release_rate(view.body, view.state, tip, direction, self.radius * view.tracker.l,
                                            front=front)
                 times = 2 ** len(images)
                 direction, vector = rate.direction, times * rate.vector
                 value, static = times * rate.G, times * rate.static
                 for plane in images:
-                    vector[plane.axis] = 0.0
+                    vector = plane.within(vector)
             except ParameterError as error:
                 note = str(error)
         shown = np.full(dim, math.nan) if direction is None else direction
@@ -154,7 +155,7 @@ class EnergyRelease(Observer):
     def _images(self, view: View, tip: np.ndarray) -> list[Plane]:
         """The planes of symmetry that a tip is on, nearer than l, so that its crack runs along them."""
         X, l = view.body.space.X, view.tracker.l
-        return [plane for plane in self._planes if abs(float(tip[plane.axis] - X[plane.nodes[0], plane.axis])) < l]
+        return [plane for plane in self._planes if plane.height(tip[None], X[plane.nodes[0]])[0] < l]
 
     def finish(self, view: View) -> None:
         """Write the file, and draw the picture."""

@@ -43,6 +43,7 @@ class View:
     integrator: of the dynamic event, if there is one.
     tracker, tips: the crack, and its tips when it was last looked for.
     moment: what has come with this step: "arrival", "branching", or "".
+    on_time: whether the event begins at a load time that was given, before anything fails.
     waiting: whether a body from rest in motion has not cracked yet, which may take thousands of records.
     save: writes a checkpoint.   stop_asked: whether the run was asked to stop.
     """
@@ -62,6 +63,7 @@ class View:
     end: float = np.inf
     occasion: str = "loading"
     moment: str = ""
+    on_time: bool = False
     waiting: bool = False
     save: Callable[[], None] = lambda: None
     stop_asked: Callable[[], bool] = lambda: False
