@@ -27,7 +27,7 @@ from skfsink.sweep.one import run_folder
 from skfsink.system import shipped
 from skfsink.system.shipped import data_folder, deck_name, deck_path, description, shipped_decks
 
-DECKS = ("biaxial_hole", "centre_crack", "pure_shear")
+DECKS = ("aneurysm", "biaxial_hole", "centre_crack", "pure_shear")
 
 
 def beside(name: str, script: str) -> ModuleType:
@@ -112,7 +112,7 @@ def test_a_name_stands_for_a_deck(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     assert deck_path(Path("pure_shear")) == path
     (tmp_path / "centre_crack").write_text("")
     assert deck_path(Path("centre_crack")) == Path("centre_crack")
-    with pytest.raises(ParameterError, match=r"one of asymmetric_.*, biaxial_hole, .*; got 'hole'"):
+    with pytest.raises(ParameterError, match=r"one of aneurysm, .*, biaxial_hole, .*; got 'hole'"):
         deck_path(Path("hole"))
 
 
@@ -224,3 +224,32 @@ def test_cracks_of_the_wide_strip(tmp_path: Path) -> None:
     assert len(left) == pytest.approx(len(right), rel=0.15) and len(right) > 100
     assert run.summary["event"]["separated"] and abs(figures["numerical"]) < 0.005
     assert 0.75 < figures["speed"] / figures["c_s"] < 1.05
+
+
+# --- the aneurysm ---
+@pytest.mark.slow
+def test_the_aneurysm_bursts_where_its_wall_is_thin(tmp_path: Path) -> None:
+    """Fails if pressure, regions and deletions together lose energy, or the tear begins where the wall is thick."""
+    mesh = beside("aneurysm", "mesh")
+    result = read_deck(shipped_decks()["aneurysm"]).run(out=tmp_path / "run", quiet=True)
+    summary, scene = result.summary, result.scene
+    x, y, z = summary["onset"]["place_mm"]
+    assert z > mesh.SAC and np.hypot(x, y) < mesh.SPOT
+    assert summary["energy"]["balance_error_relative"] < 1e-6 and summary["energy"]["pressure_work"] > 0.2
+    gone = result.state.deleted
+    middle = scene.space.X[scene.space.conn].mean(axis=1)[gone]
+    assert gone.sum() > 100 and middle[:, 2].mean() > 0.5 * mesh.SAC
+    p = result.history["pressure_MPa"]
+    assert 0.16 < p[-1] < 0.2 and np.ptp(p[result.history["phase"] == "event"]) < 1e-5
+
+
+def test_the_section_of_the_aneurysm_opens_at_its_flaw(tmp_path: Path) -> None:
+    """Fails if a cut of a deck is no weak place of a ring under pressure, or pressure carries the ring away."""
+    deck = (data_folder("aneurysm") / "section.toml").read_text(encoding="utf-8").replace("60 µs", "12 µs")
+    deck = deck.replace('"meshes/', f'"{data_folder("aneurysm")}/meshes/')
+    (tmp_path / "deck.toml").write_text(deck, encoding="utf-8")
+    result = read_deck(tmp_path / "deck.toml").run(out=tmp_path / "run", quiet=True)
+    assert result.summary["onset"]["boundary"] == "flaw" and result.state.deleted.sum() > 3
+    middle = result.scene.space.X[result.scene.space.conn].mean(axis=1)[result.state.deleted]
+    assert (middle[:, 1] > 1.0).all() and (np.abs(middle[:, 0]) < 0.2).all()
+    assert result.summary["energy"]["balance_error_relative"] < 1e-6
