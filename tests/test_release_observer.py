@@ -66,6 +66,14 @@ def test_rates_of_a_run_are_in_its_folder(tmp_path: Path) -> None:
     assert 10 < np.nanmedian(columns["speed_m_per_s"]) < 60
 
 
+def test_a_deck_asks_for_rates(tmp_path: Path) -> None:
+    """Fails if the table of a deck leaves other rates than the observer."""
+    simulation(event(), tmp_path / "seen", EnergyRelease(2e-6, radius=3.0)).run()
+    table = {"name": "G", "kind": "release_rate", "every": 2e-6, "radius": 3.0}
+    simulation(dataclasses.replace(event(), probes=(table,)), tmp_path / "asked").run()
+    assert (tmp_path / "asked" / "release.csv").read_bytes() == (tmp_path / "seen" / "release.csv").read_bytes()
+
+
 def test_resumed_run_has_the_same_rates(tmp_path: Path) -> None:
     """Fails if rows or places of tips are lost at a checkpoint."""
     whole, stopped = tmp_path / "whole", tmp_path / "stopped"

@@ -188,4 +188,5 @@ def test_run_of_a_plate_that_is_bent(integrator: str, tmp_path: Path) -> None:
     work = np.trapezoid(table["reaction_N_per_mm"][loading], table["grip_displacement_mm"][loading])
     assert work == pytest.approx(table["work"][loading][-1], rel=0.02) and work > 0
     assert state.gamma.min() < 0.1
-    assert abs(state.ledger.balance) < 1e-9 * whole.onset.figures["elastic_energy"]
+    tolerance = 1e-9 if integrator == "explicit" else 1e-5  # the forces of HHT are in balance to a tolerance
+    assert abs(state.ledger.balance) < tolerance * whole.onset.figures["elastic_energy"]

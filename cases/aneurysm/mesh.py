@@ -47,7 +47,8 @@ def section(around: int, through: int) -> meshio.Mesh:
     "below" are the nodes through the wall at the bottom, "foot" is the outermost of them.
     """
     angle, r = np.arange(around) * 2 * np.pi / around - np.pi / 2, SAC + WALL * np.linspace(0.0, 1.0, through + 1)
-    points = np.stack([np.outer(r, np.cos(angle)), np.outer(r, np.sin(angle)), np.zeros((through + 1, around))], axis=-1)
+    x, y = np.outer(r, np.cos(angle)), np.outer(r, np.sin(angle))
+    points = np.stack([x, y, np.zeros_like(x)], axis=-1)
     number = np.arange((through + 1) * around).reshape(through + 1, around)
     nxt = np.roll(number, -1, axis=1)
     cells = np.stack([number[:-1], number[1:], nxt[1:], nxt[:-1]], axis=-1)

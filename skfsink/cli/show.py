@@ -28,7 +28,8 @@ EXAMPLES = {
                'points = [["0 mm", "2 mm"], ["1 mm", "2 mm"]]   # or elements = "a set"',
                'lips = "broken"         # as of a crack that has run, or "whole" as of a cut',
                'width = "0.1 mm"        # left out: as narrow as the mesh allows'),
-    "probes": ('[[probes]]', 'name = "tip"', 'kind = "point"          # or line, mean, reaction, volume, opening',
+    "probes": ('[[probes]]', 'name = "tip"', 'kind = "point"          # line, mean, reaction, volume, opening,',
+               '                        # release_rate',
                'position = ["1 mm", "2 mm"]', 'quantity = "stress, gamma"', '[[probes]]', 'name = "forces"',
                'kind = "reaction"       # on all grips', 'every = "1 us"'),
 }

@@ -30,6 +30,7 @@ PICTURES = (
     ("loading.png", "Loading", "Load over displacement while the body was loaded, and the least relative density"),
     ("energies.png", "Energy ledger", "Where the energy of the event is over time, stacked, and what does not add up"),
     ("tip.png", "Tip of the crack", "Length of the crack, position and speed of its leading tip, and branches"),
+    ("release.png", "Energy release rate", "Energy release rate and speed of each tip over time"),
     ("fragments.png", "Pieces", "The deformed body at the end, coloured by the pieces into which it has come apart"),
     ("probes.png", "Probes", "What the probes followed: in the loading over displacement, in the event over time"),
     ("animation.gif", "Animation", "Relative density γ on the deformed body, moving"),

@@ -65,7 +65,7 @@ TYPES: Mapping[str, Mapping[str, Any]] = {
     "velocities": {"region": str, **dict.fromkeys(AXES, Annotated[float, Unit("mm/s")])},
     "regions": get_type_hints(RegionLaw, include_extras=True),
     "probes": {"name": str, "kind": str, "position": Annotated[list, Place()], "to": Annotated[list, Place()],
-               "points": int, "boundary": str, "to_boundary": str, "quantity": str,
+               "points": int, "boundary": str, "to_boundary": str, "quantity": str, "radius": float,
                "every": Annotated[float, Unit("s")], "every_passes": int},
     "cracks": {"name": str, "points": Annotated[list, Way()], "lips": str, "width": Annotated[float, Unit("mm")],
                "elements": str}}

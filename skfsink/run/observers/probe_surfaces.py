@@ -12,7 +12,9 @@ from ...errors import ParameterError, choose
 from ...fem.places import find_places
 from ...fem.surface import Surface
 from ...scene.scene import Scene
+from .observer import Observer
 from .probe import Columns, LineProbe, MeanProbe, PointProbe, Probe, position_of
+from .release import EnergyRelease
 from .view import View
 
 __all__ = ["PROBE_KINDS", "OpeningProbe", "ReactionProbe", "VolumeProbe", "probe_of", "probes_of"]
@@ -129,9 +131,11 @@ class OpeningProbe(Probe):
 PROBE_KINDS: Mapping[str, type[Probe]] = {
     "point": PointProbe, "line": LineProbe, "mean": MeanProbe, "reaction": ReactionProbe, "volume": VolumeProbe,
     "opening": OpeningProbe}
+RELEASE_RATE = "release_rate"  # the word of a deck for EnergyRelease, which has files of its own
+KINDS = (*PROBE_KINDS, RELEASE_RATE)
 
 
-def probe_of(table: Mapping[str, Any]) -> Probe:
+def probe_of(table: Mapping[str, Any]) -> Observer:
     """The probe that a table of a deck asks for; see :mod:`skfsink.scene.tables`.
 
     Raises
@@ -141,8 +145,13 @@ def probe_of(table: Mapping[str, Any]) -> Probe:
     """
     name, values = table["name"], {key: value for key, value in table.items() if key not in ("name", "kind")}
     if "kind" not in table:
-        raise ParameterError(f"probe {name}: kind is missing; it must be one of {', '.join(PROBE_KINDS)}")
-    make = PROBE_KINDS[choose(f"probe {name}: kind", table["kind"], PROBE_KINDS)]
+        raise ParameterError(f"probe {name}: kind is missing; it must be one of {', '.join(KINDS)}")
+    choose(f"probe {name}: kind", table["kind"], KINDS)
+    if table["kind"] == RELEASE_RATE:
+        if "every" not in values:
+            raise ParameterError(f"probe {name}: a {RELEASE_RATE} needs every")
+        return EnergyRelease(**_only(name, RELEASE_RATE, values, ["every", "radius", "every_passes"]))
+    make = PROBE_KINDS[table["kind"]]
     if make is OpeningProbe:
         return OpeningProbe(name, _end(name, values, "position", "boundary"), _end(name, values, "to", "to_boundary"),
                             **_only(name, table["kind"], values, ["every", "every_passes"]))
@@ -168,6 +177,6 @@ def _end(name: str, values: dict[str, Any], point: str, boundary: str) -> Any:
     return found[0]
 
 
-def probes_of(scene: Scene) -> list[Probe]:
+def probes_of(scene: Scene) -> list[Observer]:
     """The probes that a scene asks for (ParameterError)."""
     return [probe_of(table) for table in scene.probes]
