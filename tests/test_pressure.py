@@ -13,12 +13,13 @@ import numpy as np
 import pytest
 import skfem
 from bodies import box, ends, wavy
+from guarded import Stop, simulation
 from plates import deck, invoke_program
 from scipy.integrate import quad
 from skfem.io.meshio import from_meshio
 
 from skfsink.cases.custom import custom
-from skfsink.errors import MeshError, ParameterError
+from skfsink.errors import Interrupted, MeshError, ParameterError
 from skfsink.fem.facets import boundary_facets
 from skfsink.fem.forms import pressure_forms
 from skfsink.fem.pattern import Pattern
@@ -27,8 +28,9 @@ from skfsink.fields.body import Body
 from skfsink.fields.density import DensitySolver
 from skfsink.fields.momentum import Momentum
 from skfsink.fields.state import State
+from skfsink.loads.curve import Curve
 from skfsink.loads.follower import FollowerLoads
-from skfsink.loads.grips import Grip, Ramp
+from skfsink.loads.grips import Grip, Ramp, Sliding
 from skfsink.loads.pressure import Filling, Pressure
 from skfsink.loads.schedule import Loading
 from skfsink.material import AAA, Material, NeoHookean, SinkLaw
@@ -39,6 +41,9 @@ from skfsink.methods.hht import HHT
 from skfsink.methods.newton import Newton
 from skfsink.methods.statics import Statics
 from skfsink.results.loader import load
+from skfsink.run.display import Display
+from skfsink.run.simulate import Simulation
+from skfsink.scene.deck import read_deck
 from skfsink.scene.options import Options
 from skfsink.scene.tables import pressures_of, read_tables
 
@@ -156,7 +161,7 @@ def test_stiffness_of_a_fluid(kind: str) -> None:
 class Held:
     """A body between grips under pressures, with the two fields; the material never fails unless a law is given."""
 
-    def __init__(self, space: Space, grips: list[tuple[np.ndarray, Grip]], loads: list[tuple[np.ndarray, Any]],
+    def __init__(self, space: Space, grips: list[tuple[np.ndarray, Any]], loads: list[tuple[np.ndarray, Any]],
                  material: Material | None = None, law: SinkLaw = TOUGH, **controls: Any) -> None:
         self.space = space
         self.loading = Loading(space, grips, (), (), loads)
@@ -187,9 +192,12 @@ def at_radius(space: Space, radius: float) -> np.ndarray:
     return np.flatnonzero(np.isclose(np.linalg.norm(space.X, axis=1), radius))
 
 
-def tube(n: int, thinner: float = 0.0) -> Space:
-    """Quarter of the section of a thick tube, n elements through its wall, by a share thinner near the axis x."""
-    mesh = skfem.MeshQuad.init_tensor(np.linspace(INNER, OUTER, n + 1), np.linspace(0, np.pi / 2, 2 * n + 1))
+def tube(n: int, thinner: float = 0.0, angles: tuple[float, float] = (0.0, np.pi / 2)) -> Space:
+    """Part of the section of a thick tube, a quarter of it if `angles` does not say another one.
+
+    n elements go through its wall and 2 n along it; it is by the share `thinner` thinner near the axis x.
+    """
+    mesh = skfem.MeshQuad.init_tensor(np.linspace(INNER, OUTER, n + 1), np.linspace(*angles, 2 * n + 1))
     r, angle = mesh.p
     r = INNER + (r - INNER) * (1 - thinner * np.cos(angle) ** 8)
     return Space(skfem.MeshQuad(np.array([r * np.cos(angle), r * np.sin(angle)]), mesh.t))
@@ -246,6 +254,36 @@ def test_thick_tube(material: Callable[..., Material]) -> None:
         assert state.ledger.work == state.ledger.pressure_work > 0.0
     assert errors[-1] < 1e-3 * 1.3 / 2
     assert all(3.4 < coarse / fine < 4.8 for coarse, fine in pairwise(errors))
+
+
+def test_a_wedge_between_sliding_planes_is_a_tube() -> None:
+    """Fails if pressure on a rim that slides on oblique planes is taken for one without a potential."""
+    grown = []
+    for angles in ((0.0, np.pi / 2), (np.pi / 9, np.pi / 4)):
+        space = tube(4, angles=angles)
+        at, inner = np.arctan2(space.X[:, 1], space.X[:, 0]), at_radius(space, INNER)
+        sides = [(np.flatnonzero(np.isclose(at, a, atol=1e-6)), Sliding(str(a))) for a in angles]
+        held = Held(space, sides, [(inner, Pressure("inner", Ramp((0.0, 1.0), (0.0, 0.3))))], tolerance=1e-8)
+        state = held.load()
+        assert held.momentum.skew_stiffness(state.u, held.loading.free) is None
+        grown.append(np.linalg.norm((space.X + state.u)[inner], axis=1).mean() - INNER)
+        assert abs(state.ledger.balance) < 1e-3 * state.ledger.elastic
+        Held(space, sides, [(inner, Filling("inner", 0.1, 1e-6))])  # is not refused
+    assert held.loading.sliding is not None
+    assert grown[1] == pytest.approx(grown[0], rel=0.01) and grown[0] > 0.1  # the wedge has smaller elements along it
+
+
+def test_a_pressure_is_a_function_of_time() -> None:
+    """Fails if a curve gives another pressure than its function, or load increments pass its turns."""
+    space = tube(3)
+    curve = Curve(lambda t: 0.1 * np.sin(t) ** 2, until=4.0)
+    held = Held(space, symmetric(space), [(at_radius(space, INNER), Pressure("inner", curve))])
+    seen = []
+    for state in held.statics.load(held.state):
+        assert held.followers.values[0] == pytest.approx(0.1 * np.sin(state.grip) ** 2, abs=1e-12)
+        seen.append(held.followers.swept(state.u)[0])
+    assert max(seen) > 20 * min(seen[len(seen) // 2:]) and state.grip == pytest.approx(4.0)
+    assert abs(state.ledger.balance) < 1e-3 * max(state.ledger.work, 1e-3)
 
 
 def test_ball_past_its_greatest_pressure() -> None:
@@ -394,7 +432,7 @@ def ring(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_a_deck_bursts_a_ring(ring: Path) -> None:
-    """Fails if a deck, its scene file and Python differ, a resumed run leaves its bytes, or the columns are wrong."""
+    """Fails if a deck, its scene file and Python differ, or the columns are wrong."""
     assert invoke_program("run", deck(ring, RING), "--out", "first", "--quiet")[0] == 0
     grips = [Grip("left", (0.0, None)), Grip("bottom", (None, 0.0))]
     options = Options(length_scale=0.12, event_time=2e-5, out=Path("second"), quiet=True)
@@ -410,6 +448,24 @@ def test_a_deck_bursts_a_ring(ring: Path) -> None:
     np.testing.assert_allclose(history["grip_displacement_mm"], history["swept_volume"] / (np.pi / 2), rtol=3e-3)
     assert (history["reaction_N_per_mm"][loading] > p[loading] * np.pi / 2).all()
     assert run.summary["energy"]["pressure_work"] > 0
+
+
+@pytest.mark.parametrize(("text", "integrator"), [
+    ('[[pressures]]\nboundary = "inner"\nrate = "10 kPa/s"\nin_crack = true\n', "explicit"),
+    ('[[fillings]]\nboundary = "inner"\ninflow = "0.01 mm^3/s"\ncompliance = "0.01 mm^3/kPa"\n', "explicit"),
+    pytest.param('[[fillings]]\nboundary = "inner"\ninflow = "0.01 mm^3/s"\ncompliance = "0.01 mm^3/kPa"\n', "hht",
+                 marks=pytest.mark.slow)])
+def test_a_resumed_run_leaves_the_same_bytes(ring: Path, text: str, integrator: str) -> None:
+    """Fails if a checkpoint loses facets that have failed, volumes below them, or what was added to a fluid."""
+    head = RING.partition("[[pressures]]")[0].replace(
+        'event_time = "20 µs"', f'integrator = "{integrator}"\nevent_time = "50 µs"\novershoot = 0.05')
+    of = read_deck(deck(ring, head + text)).scene()
+    state = simulation(of, ring / "whole").run()
+    assert state.deleted.any() and abs(state.ledger.balance) < 1e-4 * state.ledger.turnover
+    with pytest.raises(Interrupted):
+        simulation(of, ring / "broken", Stop(state.step * 2 // 3)).run()
+    Simulation(of, ring / "broken", Display(True), resume=True).run()
+    assert (ring / "whole" / "history.csv").read_bytes() == (ring / "broken" / "history.csv").read_bytes()
 
 
 @pytest.mark.parametrize(("text", "said"), [

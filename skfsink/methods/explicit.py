@@ -315,7 +315,7 @@ class Explicit:
     # --- checkpoints ---
     def memory(self) -> dict[str, np.ndarray]:
         """What the integrator remembers beyond the state, for a checkpoint."""
-        return {"reaction": self.reaction, "zone_depths": np.array([zone.depth for zone in self._zones], int),
+        return {"reaction": self.reaction, "zone_depths": np.array([zone.depth for zone in self._zones], float),
                 **{name: np.array(getattr(self, name)) for name in self._REMEMBERED}, **self.length.memory(),
                 **({} if self._viscous is None else {"viscous": self._viscous}),
                 **self.momentum.memory()}
