@@ -24,6 +24,7 @@ from runs import CASES
 from skfsink.errors import OutputError, ParameterError, require
 from skfsink.study.speed_accuracy import PARTS
 from skfsink.study.stability import FAILURES
+from skfsink.study.validation import KNOWN
 
 ROOT = Path(__file__).resolve().parents[1]
 app = App(name="python figures/everything.py", help=__doc__, help_format="plaintext", version_flags=[])
@@ -60,6 +61,9 @@ STEPS: dict[str, Step] = {step.name: step for step in (
     _study("notch", 0.4, "notch.png"),
     _study("speed_accuracy", 2.5, "speed_accuracy.png", *(f"speed_accuracy_{part}.png" for part in PARTS)),
     _study("stability", 0.2, *(f"stability_{failure}.png" for failure in FAILURES)),
+    Step("validation", ("-m", "skfsink.study.validation", "--page", "docs/validation.md"), 0.1,
+         "results/study/validation", {"validation.json": "docs/images/validation.json"}
+         | {f"validation_{part}.png": f"docs/images/validation_{part}.png" for part in KNOWN}),
     Step("ladder", ("-m", "skfsink.study.ladder", "--out", "results/study/ladder"), 1.5, "results/study/ladder",
          {f"{case}/ladder.json": f"cases/{case}/ladder.json" for case in CASES}
          | {"ladder.png": "docs/images/ladder.png"}),

@@ -109,5 +109,6 @@ def _cpu() -> float:
 def _command(words: Sequence[str]) -> str:
     """The command line of a study without what does not change its points: where it writes, and whether it is quiet."""
     kept = [word for word, before in zip(words, ["", *words])
-            if word not in ("--out", "--quiet") and before != "--out" and not word.startswith("--out=")]
+            if word not in ("--out", "--page", "--quiet") and before not in ("--out", "--page")
+            and not word.startswith(("--out=", "--page="))]
     return shlex.join(["python", *kept])
