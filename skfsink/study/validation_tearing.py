@@ -205,8 +205,7 @@ def rows_tearing(points: Points) -> list[Row]:
 
 REASONS = {
     SOLID: "; as thick as $l$, on two and four layers",
-    TROUSERS: "; the tear begins at the faces of the sheet, which the legs bend at the tip of the cut; on two and "
-              "four layers",
+    TROUSERS: "; the tear begins at a face of the sheet, and not at mid-thickness; on two and four layers",
 }
 
 
