@@ -87,6 +87,11 @@ from skfsink import Options
 from skfsink.cases.single_edge_notch import single_edge_notch
 single_edge_notch(mesh="coarse", options=Options(length_scale=0.9, quiet=True,
                                                  out="results/single_edge_notch/M3-dynamic"))
+""",
+    "class AtTheNotch(": """
+from plates import plate
+from skfsink.meshing import write_mesh
+write_mesh("cases/meshes/coarse.vtu", plate(31))  # a domain of 0.6 mm has elements
 """}
 #: uses of what a block defines, by words in it
 AFTER = {
