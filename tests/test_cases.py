@@ -23,7 +23,7 @@ ELEMENT = 0.1 / 1.5
 pytestmark = pytest.mark.slow
 
 
-@pytest.fixture(scope="module", params=[pytest.param(case, marks=pytest.mark.xdist_group(case)) for case in CASES])
+@pytest.fixture(scope="module", params=CASES)
 def both(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Result:
     """Both analyses of a case."""
     case = getattr(importlib.import_module(f"skfsink.cases.{request.param}"), request.param)

@@ -12,7 +12,6 @@ from skfsink.results.result import Result
 from skfsink.scene.options import Options
 
 ELEMENT = 0.1 / 1.5  # of the coarse mesh [mm]
-pytestmark = pytest.mark.xdist_group("single_edge_notch")  # one worker makes the runs
 
 
 @pytest.fixture(scope="module")
