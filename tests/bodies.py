@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import skfem
@@ -18,6 +18,7 @@ from skfsink.loads.nodal import NodalLoads
 from skfsink.loads.schedule import Loading
 from skfsink.material import AAA, Material, SinkLaw
 from skfsink.material.regions import Region
+from skfsink.methods.controls import StaticsControls
 from skfsink.methods.statics import Statics
 
 FAILED = 1.0  # MPa: six times Phi, H = 0
@@ -53,6 +54,29 @@ def notched(n: int, length: float = 1.0, notch: float = 0.4) -> Space:
     x, y = mesh.p[:, mesh.t].mean(axis=1)
     slit = (x < notch) & (np.abs(y - length / 2) < 0.51 * length / n)
     return Space(mesh.remove_elements(np.flatnonzero(slit)))
+
+
+class Loadable:
+    """A body, as its loading has it, the two fields, and statics on the way."""
+
+    def __init__(self, space: Space, loading: Loading, material: Material, law: SinkLaw, **controls: Any) -> None:
+        self.space, self.loading = space, loading
+        self.momentum = Momentum(space, material, dead=loading.dead, followers=loading.followers)
+        self.body = Body(self.momentum, DensitySolver(space, law), loading)
+        self.statics = Statics(self.body, StaticsControls(**controls))
+        self.state = State.intact(space)
+
+    def load(self, until: float = np.inf) -> State:
+        """Load up to a time, or to the onset."""
+        for state in self.statics.load(self.state):
+            if state.grip >= until:
+                break
+        return self.state
+
+    def start(self, past: float) -> State:
+        """Go from the onset to the start of the event."""
+        self.state.begin_event(past, self.statics.clock.grown(self.state.grip, past))
+        return self.state
 
 
 def boundary(space: Space) -> np.ndarray:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bodies import Weight, box, ends, notched, wavy
+from bodies import Loadable, Weight, box, ends, notched, wavy
 from dissipation import Energies
 from guarded import NOTCHED, PLAIN, Stop, simulation
 
@@ -21,7 +21,7 @@ from skfsink.fields.state import State
 from skfsink.loads.grips import Grip, Ramp, Traction
 from skfsink.loads.schedule import Loading
 from skfsink.material import AAA, SinkLaw
-from skfsink.methods.controls import ExplicitControls, HHTControls, StaticsControls
+from skfsink.methods.controls import ExplicitControls, HHTControls
 from skfsink.methods.explicit import Explicit
 from skfsink.methods.hht import HHT
 from skfsink.methods.statics import Statics
@@ -36,30 +36,13 @@ TOUGH = SinkLaw(phi=1e3)  # never reached: gamma stays 1
 FINE = {"force_tolerance": 1e-8, "correction_tolerance": 1e-8, "gamma_tolerance": 1e-7, "max_iterations": 40}
 
 
-class Loaded:
+class Loaded(Loadable):
     """A body with grips and tractions on its sides, and the two fields."""
 
     def __init__(self, space: Space, grips: tuple[Grip, ...], tractions: tuple[Traction, ...] = (),
                  law: SinkLaw = TOUGH, **controls: Any) -> None:
-        self.space = space
-        self.loading = Loading(space, [(side(space, g.boundary), g) for g in grips],
-                               [(side(space, t.boundary), t) for t in tractions])
-        self.momentum = Momentum(space, AAA(), dead=self.loading.dead)
-        self.body = Body(self.momentum, DensitySolver(space, law), self.loading)
-        self.statics = Statics(self.body, StaticsControls(**controls))
-        self.state = State.intact(space)
-
-    def load(self, until: float = np.inf) -> State:
-        """Load up to a time, or to the onset."""
-        for state in self.statics.load(self.state):
-            if state.grip >= until:
-                break
-        return self.state
-
-    def start(self, past: float) -> State:
-        """Go from the onset to the start of the event."""
-        self.state.begin_event(past, self.statics.clock.grown(self.state.grip, past))
-        return self.state
+        super().__init__(space, Loading(space, [(side(space, g.boundary), g) for g in grips],
+                                        [(side(space, t.boundary), t) for t in tractions]), AAA(), law, **controls)
 
 
 def side(space: Space, name: str) -> np.ndarray:

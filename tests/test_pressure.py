@@ -12,11 +12,10 @@ import meshio
 import numpy as np
 import pytest
 import skfem
-from bodies import box, ends, wavy
+from bodies import Loadable, box, ends, wavy
 from guarded import Stop, simulation
 from plates import deck, invoke_program
 from scipy.integrate import quad
-from skfem.io.meshio import from_meshio
 
 from skfsink.cases.custom import custom
 from skfsink.errors import Interrupted, MeshError, ParameterError
@@ -27,7 +26,6 @@ from skfsink.fem.space import Space
 from skfsink.fields.body import Body
 from skfsink.fields.density import DensitySolver
 from skfsink.fields.momentum import Momentum
-from skfsink.fields.state import State
 from skfsink.loads.curve import Curve
 from skfsink.loads.follower import FollowerLoads
 from skfsink.loads.grips import Grip, Ramp, Sliding
@@ -35,17 +33,17 @@ from skfsink.loads.pressure import Filling, Pressure
 from skfsink.loads.schedule import Loading
 from skfsink.material import AAA, Material, NeoHookean, SinkLaw
 from skfsink.meshing.vtu import write_mesh
-from skfsink.methods.controls import ExplicitControls, HHTControls, StaticsControls
+from skfsink.methods.controls import ExplicitControls, HHTControls
 from skfsink.methods.explicit import Explicit
 from skfsink.methods.hht import HHT
 from skfsink.methods.newton import Newton
-from skfsink.methods.statics import Statics
 from skfsink.results.loader import load
 from skfsink.run.display import Display
 from skfsink.run.simulate import Simulation
 from skfsink.scene.deck import read_deck
 from skfsink.scene.options import Options
 from skfsink.scene.tables import pressures_of, read_tables
+from skfsink.study.validation_cavitation import octant
 
 TOUGH = SinkLaw(phi=1e3)  # never reached: gamma stays 1
 INNER, OUTER = 1.0, 1.5   # radii of tube and ball [mm]
@@ -158,26 +156,14 @@ def test_stiffness_of_a_fluid(kind: str) -> None:
 
 
 # --- bodies ---
-class Held:
+class Held(Loadable):
     """A body between grips under pressures, with the two fields; the material never fails unless a law is given."""
 
     def __init__(self, space: Space, grips: list[tuple[np.ndarray, Any]], loads: list[tuple[np.ndarray, Any]],
                  material: Material | None = None, law: SinkLaw = TOUGH, **controls: Any) -> None:
-        self.space = space
-        self.loading = Loading(space, grips, (), (), loads)
+        super().__init__(space, Loading(space, grips, (), (), loads), material or AAA(), law, **controls)
         assert self.loading.followers is not None
         self.followers = self.loading.followers
-        self.momentum = Momentum(space, material or AAA(), followers=self.followers)
-        self.body = Body(self.momentum, DensitySolver(space, law), self.loading)
-        self.statics = Statics(self.body, StaticsControls(**controls))
-        self.state = State.intact(space)
-
-    def load(self, until: float = np.inf) -> State:
-        """Load to a time, or as far as loading goes."""
-        for state in self.statics.load(self.state):
-            if state.grip >= until:
-                break
-        return self.state
 
 
 def symmetric(space: Space) -> list[tuple[np.ndarray, Grip]]:
@@ -205,17 +191,7 @@ def tube(n: int, thinner: float = 0.0, angles: tuple[float, float] = (0.0, np.pi
 
 def ball(n: int, layers: int) -> Space:
     """Octant of a hollow ball: three patches of n x n faces, and `layers` through its wall."""
-    s = np.linspace(0, 1, n + 1)
-    patch = skfem.MeshQuad.init_tensor(s, s)
-    a, b = np.tan(patch.p * np.pi / 4)
-    points = [np.roll(np.array([np.ones_like(a), a, b]), k, axis=0) for k in range(3)]
-    p = np.hstack([x / np.linalg.norm(x, axis=0) for x in points])
-    t = np.hstack([patch.t + k * a.size for k in range(3)])
-    _, first, number = np.unique(np.round(p, 9), axis=1, return_index=True, return_inverse=True)
-    p, t = p[:, first], number.ravel()[t]
-    X = np.hstack([r * p for r in np.linspace(INNER, OUTER, layers + 1)])
-    cells = np.hstack([np.vstack([t + i * p.shape[1], t + (i + 1) * p.shape[1]]) for i in range(layers)])
-    return Space(from_meshio(meshio.Mesh(X.T, [("hexahedron", cells.T)])))
+    return octant(n, np.linspace(INNER, OUTER, layers + 1))
 
 
 def thick(material: Material, a: float, dim: int) -> float:

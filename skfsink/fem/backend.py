@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -24,6 +24,23 @@ class Part(NamedTuple):
     material: Material
     elements: np.ndarray | None
     fibres: np.ndarray | None
+
+    def numbers(self, own: np.ndarray | slice) -> np.ndarray | slice:
+        """Numbers in the mesh of elements by their numbers in the part."""
+        return own if self.elements is None else self.elements[own]
+
+
+def among(parts: Sequence[Part], elements: np.ndarray) -> Iterator[tuple[Part, np.ndarray, np.ndarray]]:
+    """The parts that `elements` (m,) are of, in any order; of each its ones by their numbers among the m, and in it."""
+    for part in parts:
+        here = np.arange(elements.size) if part.elements is None else np.flatnonzero(np.isin(elements, part.elements))
+        if not here.size:
+            continue
+        own = elements[here]
+        if part.elements is not None:
+            order = np.argsort(part.elements)
+            own = order[np.searchsorted(part.elements, own, sorter=order)]
+        yield part, here, own
 
 
 class MomentumBackend(Protocol):

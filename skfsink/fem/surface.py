@@ -8,6 +8,7 @@ from scipy.sparse.csgraph import connected_components
 
 from ..errors import MeshError, ParameterError, place_text
 from .facets import FACETS, boundary_facets, facets_of
+from .kernels.surface import swept_volumes
 from .places import Places
 from .quadrature import points, shape_functions
 from .space import Space
@@ -133,12 +134,11 @@ class Surface:
 
 
 def _flux(corners: np.ndarray) -> float:
-    """(1/dim) int x . n dA over facets with corners (nf, 2 or 4, dim), those in space bilinear; it is exact."""
-    if corners.shape[1] == 2:
-        a, b = corners[:, 0], corners[:, 1]
-        return float((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum()) / 2
-    N, dN = shape_functions(points(2))
-    of = corners[:, _QUAD]  # lexicographic
-    x, arm = np.einsum("qa,eai->eqi", N, of), np.einsum("qak,eai->kqei", dN, of)
-    normal = np.swapaxes(np.cross(arm[0], arm[1]), 0, 1)
-    return float(np.einsum("eqi,eqi->", x, normal)) / (3 * len(N))
+    """(1/dim) int x . n dA over facets with corners (nf, 2 or 4, dim), those in space bilinear; it is exact.
+
+    It is the volume that they sweep on their way from the origin.
+    """
+    of = corners if corners.shape[1] == 2 else corners[:, _QUAD]
+    x, out = of.reshape(-1, of.shape[2]), np.empty(len(of))
+    swept_volumes(np.arange(len(x)).reshape(of.shape[:2]), np.zeros_like(x), x, np.ones((2, len(of))), out)
+    return -float(out.sum())

@@ -20,11 +20,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..fem.backend import Part, among
 from ..material import GeneralMaterial, Material
 from ..material.crushed import J_FLOOR, crushed
-from .momentum import Momentum, Part
+from ..material.general import cofactor
+from .momentum import Momentum
 
-__all__ = ["PointStress", "configurational_forces", "effective_density", "point_stress"]
+__all__ = ["PointStress", "configurational_forces", "point_stress"]
 
 
 class PointStress(NamedTuple):
@@ -50,13 +52,6 @@ class PointStress(NamedTuple):
         return np.asarray(S)
 
 
-def effective_density(momentum: Momentum, gamma: np.ndarray, deleted: np.ndarray, elements: np.ndarray) -> np.ndarray:
-    """Relative density that the force sees at the Gauss points of `elements` (m,), (m, nq), of nodal `gamma` (n,)."""
-    at_gauss = gamma[momentum.space.conn[elements]] @ momentum.space.N.T
-    at_gauss[(at_gauss < momentum.force_floor) | deleted[elements, None]] = 0.0
-    return np.asarray(at_gauss)
-
-
 def configurational_forces(momentum: Momentum, u: np.ndarray) -> np.ndarray:
     """Derivative of the stored energy with the undeformed places of the nodes, at fixed displacements of these.
 
@@ -80,39 +75,22 @@ def point_stress(momentum: Momentum, u: np.ndarray, elements: np.ndarray, gamma:
     space, dim = momentum.space, momentum.space.dim
     H = np.swapaxes(u[space.conn[elements]], 1, 2)[:, None] @ space.dN[elements]
     found = PointStress(np.zeros_like(gamma), np.zeros_like(gamma), np.zeros_like(H), H)
-    for part, rows in parts_of(momentum, elements):
+    for part, rows, own in among(momentum.parts, elements):
         F = np.zeros((len(rows), gamma.shape[1], 3, 3))
         F[...] = np.eye(3)
         F[..., :dim, :dim] += H[rows]
-        W, P, excess = _of_part(momentum, part, elements[rows], F, gamma[rows])
+        W, P, excess = _of_part(momentum, part, own, F, gamma[rows])
         found.energy[rows], found.excess[rows], found.P[rows] = gamma[rows] * W, excess, P[..., :dim, :dim]
     return found
 
 
-def parts_of(momentum: Momentum, elements: np.ndarray) -> list[tuple[Part, np.ndarray]]:
-    """The parts that `elements` (m,) are of, each with the numbers of its ones among the m."""
-    found = []
-    for part in momentum.parts:
-        rows = np.arange(elements.size) if part.elements is None else np.flatnonzero(np.isin(elements, part.elements))
-        if rows.size:
-            found.append((part, rows))
-    return found
-
-
-def fibres_at(part: Part, elements: np.ndarray) -> np.ndarray | None:
-    """Directions (m, families, 3) of the fibres in `elements` (m,) of a part; None if it has none."""
-    if part.fibres is None:
-        return None
-    return part.fibres[elements if part.elements is None else np.searchsorted(part.elements, elements)]
-
-
-def _of_part(momentum: Momentum, part: Part, elements: np.ndarray, F: np.ndarray,
+def _of_part(momentum: Momentum, part: Part, own: np.ndarray, F: np.ndarray,
              gamma: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """W of the undamaged material, P weighted by gamma, and p (J - J_bar), of elements of one part."""
-    material, w = part.material, momentum.space.w[elements]
+    """W of the undamaged material, P weighted by gamma, and p (J - J_bar), of elements by their numbers in one part."""
+    material, w = part.material, momentum.space.w[part.numbers(own)]
     if momentum.plane_stress:
         return _of_sheet(material, F, gamma)
-    cof = _cofactor(F)
+    cof = cofactor(F)
     J = np.einsum("...J,...J", F[..., 0, :], cof[..., 0, :])
     k, J_bar, gamma_bar = material.bulk_modulus, J, gamma
     if momentum.element == "jbar":
@@ -120,8 +98,7 @@ def _of_part(momentum: Momentum, part: Part, elements: np.ndarray, F: np.ndarray
     p = gamma_bar * k * (J_bar - 1)
     F = np.where((gamma > 0)[..., None, None], F, np.eye(3))  # a dead point may have any shape
     if isinstance(material, GeneralMaterial):
-        fibres = fibres_at(part, elements)
-        fibres = None if fibres is None else fibres[:, None]
+        fibres = None if part.fibres is None else part.fibres[own][:, None]
         psi = material.isochoric_energy(F, J_FLOOR, fibres)
         P = material.isochoric_stress(F, J_FLOOR, fibres)
     else:
@@ -143,7 +120,7 @@ def _of_sheet(material: Material, F: np.ndarray, gamma: np.ndarray) -> tuple[np.
     across = _across(material, t, j)
     J = j * across
     psi, slope, _ = material.isochoric(J ** (-2 / 3) * (t + across**2))
-    cof = _cofactor(F)
+    cof = cofactor(F)
     P = (2 * gamma * slope * J ** (-2 / 3))[..., None, None] * (F - (across**2 / j)[..., None, None] * cof)
     return psi + 0.5 * material.bulk_modulus * (J - 1) ** 2, P, np.zeros_like(gamma)
 
@@ -163,14 +140,3 @@ def _across(material: Material, t: np.ndarray, j: np.ndarray) -> np.ndarray:
         if np.abs(step).max(initial=0.0) < 1e-9:
             return np.asarray(y**3 / j)
     return material.stretch_across(t, j)
-
-
-def _cofactor(F: np.ndarray) -> np.ndarray:
-    """cof F of matrices (..., 3, 3), also where F is singular."""
-    out = np.empty_like(F)
-    for i in range(3):
-        b, c = (i + 1) % 3, (i + 2) % 3
-        for k in range(3):
-            m, n = (k + 1) % 3, (k + 2) % 3
-            out[..., i, k] = F[..., b, m] * F[..., c, n] - F[..., b, n] * F[..., c, m]
-    return out

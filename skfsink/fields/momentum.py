@@ -120,9 +120,15 @@ class Momentum:
         """Only for tangents and masses; forces keep what :meth:`set_gamma` gave."""
         self._gamma = gamma
 
-    def effective(self, gamma: np.ndarray, deleted: np.ndarray) -> np.ndarray:
-        """Relative density the force sees (ne, nq), for nodal values `gamma` (n,) and `deleted` elements (ne,)."""
-        at_gauss = self.space.at_gauss(gamma)
+    def effective(self, gamma: np.ndarray, deleted: np.ndarray, elements: np.ndarray | None = None) -> np.ndarray:
+        """Relative density the force sees (ne, nq), for nodal values `gamma` (n,) and `deleted` elements (ne,).
+
+        Of some `elements` (m,) alone if they are given, (m, nq).
+        """
+        if elements is None:
+            at_gauss = self.space.at_gauss(gamma)
+        else:
+            at_gauss, deleted = gamma[self.space.conn[elements]] @ self.space.N.T, deleted[elements]
         at_gauss[(at_gauss < self.force_floor) | deleted[:, None]] = 0.0
         return at_gauss
 
@@ -162,16 +168,20 @@ class Momentum:
         """
         return self.energy + self.loads + self.pressed
 
+    @property
+    def pressure_values(self) -> np.ndarray | None:
+        """:attr:`.FollowerLoads.values` now, for :meth:`pressure_work` later; None without pressures."""
+        return None if self.followers is None else self.followers.values
+
     def pressure_work(self, u: np.ndarray, end: np.ndarray, before: np.ndarray | None = None,
                       equilibria: bool = False) -> float:
         """Work of the pressures on the straight way from `u` to `end` (n, dim) [N mm; N mm/mm in 2D].
 
-        They stand still in time, or go evenly from those `before`, :attr:`.FollowerLoads.values` then; see
+        They stand still in time, or go evenly from those `before`, :attr:`pressure_values` then; see
         :meth:`.FollowerLoads.work` for `equilibria`.
         """
         loads = self.followers
-        return 0.0 if loads is None else loads.work(loads.values if before is None else before, u, end,
-                                                          equilibria)
+        return 0.0 if loads is None else loads.work(loads.values if before is None else before, u, end, equilibria)
 
     def load_size(self, u: np.ndarray) -> float:
         """Norms of the nodal forces of dead loads and of pressures at `u`, added [N; N/mm in 2D]."""

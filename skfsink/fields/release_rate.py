@@ -23,10 +23,11 @@ import numpy as np
 from scipy.sparse.csgraph import connected_components
 
 from ..errors import ParameterError, place_text, require
+from ..fem.backend import among
 from ..fem.space import Space, node_key
 from ..material import Material
 from .body import Body
-from .configurational import PointStress, effective_density, fibres_at, parts_of, point_stress
+from .configurational import PointStress, point_stress
 from .crack import CRACKED
 from .momentum import Momentum
 from .state import State
@@ -105,7 +106,7 @@ def energy_release_rate(body: Body, state: State, tip: np.ndarray, direction: np
     at = f"the domain of {radius:.4g} mm around the tip at {place_text(tip)} mm"
     _check_forces(momentum, state, domain, at)
     elements = domain.elements
-    gamma = effective_density(momentum, state.gamma, state.deleted, elements)
+    gamma = momentum.effective(state.gamma, state.deleted, elements)
     stress = point_stress(momentum, state.u, elements, gamma)
     w, dN = space.w[elements], space.dN[elements]
     dq = (domain.q[:, None, None] @ dN)[..., 0, :]
@@ -242,9 +243,8 @@ def _check_forces(momentum: Momentum, state: State, domain: _Domain, at: str) ->
     if followers is not None and followers.pressures(state.u).any() and np.isin(followers.nodes, inside).any():
         raise ParameterError(f"{at} has a pressure in it, which feeds in energy there: give a smaller radius, or a "
                              f"pressure that is not in_crack")
-    for part, rows in parts_of(momentum, elements):
-        fibres = fibres_at(part, elements[rows])
-        if fibres is not None and fibres.size and np.ptp(fibres, axis=0).max() > 1e-6:
+    for part, _, own in among(momentum.parts, elements):
+        if part.fibres is not None and part.fibres.size and np.ptp(part.fibres[own], axis=0).max() > 1e-6:
             raise ParameterError(f"{at} has fibres that turn, so that the body is not homogeneous along the crack: no "
                                  f"energy release rate is defined")
 
@@ -291,7 +291,7 @@ def _check_surroundings(body: Body, state: State, domain: _Domain, density: np.n
 def _different(momentum: Momentum, elements: np.ndarray) -> list[np.ndarray]:
     """The numbers of elements (m,) among the m by their stored energies; regions may differ in the sink alone."""
     found: list[tuple[Material, list[np.ndarray]]] = []
-    for part, rows in parts_of(momentum, elements):
+    for part, rows, _ in among(momentum.parts, elements):
         for material, members in found:
             if material == part.material:
                 members.append(rows)

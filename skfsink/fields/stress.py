@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..fem.backend import Part, among
 from ..material import GeneralMaterial
 from ..material.crushed import J_FLOOR
-from .momentum import Momentum, Part
+from .momentum import Momentum
 
 __all__ = ["cauchy_stress", "pressure", "principal_stresses", "von_mises"]
 
@@ -29,7 +30,7 @@ def cauchy_stress(momentum: Momentum, u: np.ndarray, elements: np.ndarray | None
     for part in momentum.parts:
         for start in range(0, space.n_elements if part.elements is None else part.elements.size, _CHUNK):
             rows = slice(start, start + _CHUNK)
-            some = rows if part.elements is None else part.elements[rows]
+            some = part.numbers(rows)
             means[some] = np.einsum("eq,eqc->ec", space.w[some], _at_points(momentum, u, part, rows, gamma[some]))
     return np.asarray(means / space.V[:, None])
 
@@ -37,16 +38,9 @@ def cauchy_stress(momentum: Momentum, u: np.ndarray, elements: np.ndarray | None
 def _of_some(momentum: Momentum, u: np.ndarray, elements: np.ndarray) -> np.ndarray:
     """Stress of some elements (m,), in any order."""
     means, w = np.zeros((elements.size, 6)), momentum.space.w[elements]
-    for part in momentum.parts:
-        if part.elements is None:
-            here, rows = np.arange(elements.size), elements
-        else:
-            here = np.flatnonzero(np.isin(elements, part.elements))
-            order = np.argsort(part.elements)
-            rows = order[np.searchsorted(part.elements, elements[here], sorter=order)]
-        if here.size:
-            means[here] = np.einsum("eq,eqc->ec", w[here],
-                                    _at_points(momentum, u, part, rows, momentum.gamma[elements[here]]))
+    for part, here, own in among(momentum.parts, elements):
+        means[here] = np.einsum("eq,eqc->ec", w[here],
+                                _at_points(momentum, u, part, own, momentum.gamma[elements[here]]))
     return np.asarray(means / momentum.space.V[elements, None])
 
 
@@ -54,7 +48,7 @@ def _at_points(momentum: Momentum, u: np.ndarray, part: Part, rows: slice | np.n
                gamma: np.ndarray) -> np.ndarray:
     """Stress at the Gauss points of some elements of a part, whose density is `gamma`."""
     space, material, k = momentum.space, part.material, part.material.bulk_modulus
-    elements = rows if part.elements is None else part.elements[rows]
+    elements = part.numbers(rows)
     F = np.zeros((*gamma.shape, 3, 3))
     F[...] = np.eye(3)
     F[..., :space.dim, :space.dim] += np.einsum("eai,eqaJ->eqiJ", u[space.conn[elements]], space.dN[elements])

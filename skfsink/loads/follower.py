@@ -53,7 +53,7 @@ class FollowerLoads:
 
     def __init__(self, space: Space, loads: Sequence[tuple[np.ndarray, _Load]]) -> None:
         self.space, self.loads = space, tuple(load for _, load in loads)
-        self._fillings = [k for k, load in enumerate(self.loads) if isinstance(load, Filling)]
+        self._fillings = [(k, load) for k, load in enumerate(self.loads) if isinstance(load, Filling)]
         in_crack = [k for k, load in enumerate(self.loads) if isinstance(load, Pressure) and load.in_crack]
         self._wet = WettedSurface(space, [(load.boundary, nodes) for nodes, load in loads], in_crack)
         self._kept_volume = np.zeros(self._wet.bears.size)  # swept below each facet that does not bear load any more
@@ -82,7 +82,7 @@ class FollowerLoads:
 
     def speed(self, t: float) -> float:
         """Fastest mean motion of the boundary of a filling from load time `t` on [mm/s]."""
-        return max((abs(_rate(self.loads[k], t)) / float(self.areas[k]) for k in self._fillings), default=0.0)
+        return max((abs(_rate(load, t)) / float(self.areas[k]) for k, load in self._fillings), default=0.0)
 
     def keep(self, gamma: np.ndarray, deleted: np.ndarray, floor: float) -> None:
         """Let loads act where elements bear force; see :meth:`.WettedSurface.keep`."""
@@ -99,11 +99,9 @@ class FollowerLoads:
         values = self.values if values is None else values
         if not self._fillings:
             return values
-        p = values.copy()
-        for k in self._fillings:
-            load = self.loads[k]
-            assert isinstance(load, Filling)
-            p[k] = (p[k] + self._added[k] - self.swept(u)[k]) / load.compliance
+        p, volumes = values.copy(), self.swept(u)
+        for k, load in self._fillings:
+            p[k] = (p[k] + self._added[k] - volumes[k]) / load.compliance
         return p
 
     def hold(self, u: np.ndarray, pressures: np.ndarray) -> None:
@@ -111,10 +109,9 @@ class FollowerLoads:
 
         An event begins with a body that is scaled past its onset; a stiff fluid would burst it, or let go of it.
         """
-        for k in self._fillings:
-            load = self.loads[k]
-            assert isinstance(load, Filling)
-            self._added[k] = pressures[k] * load.compliance + self.swept(u)[k] - self.values[k]
+        volumes = self.swept(u)
+        for k, load in self._fillings:
+            self._added[k] = pressures[k] * load.compliance + volumes[k] - self.values[k]
 
     def add_force(self, u: np.ndarray, out: np.ndarray) -> None:
         """Take the forces at the displacement `u` from `out`, both (n, dim): it is the internal force less loads."""
@@ -137,12 +134,9 @@ class FollowerLoads:
         follow its fluid.
         """
         first, last = self.pressures(u, before), self.pressures(end)
-        if self._fillings and not equilibria:
-            for k in self._fillings:  # p = (Q - V)/C: V goes from its first to its last value as the way has it
-                load = self.loads[k]
-                assert isinstance(load, Filling)
-                mean, half = 0.5 * (first[k] + last[k]), 0.5 * (self.values[k] - before[k]) / load.compliance
-                first[k], last[k] = mean - half, mean + half
+        for k, load in self._fillings if not equilibria else ():  # p = (Q - V)/C, where V goes as the way has it
+            mean, half = 0.5 * (first[k] + last[k]), 0.5 * (self.values[k] - before[k]) / load.compliance
+            first[k], last[k] = mean - half, mean + half
         return self._swept_work(first, last, u, end)
 
     def _swept_work(self, first: np.ndarray, last: np.ndarray, u: np.ndarray, end: np.ndarray) -> float:
@@ -186,9 +180,9 @@ class FollowerLoads:
         ParameterError
             There is such a filling.
         """
-        for k in self._fillings:
+        for k, load in self._fillings:
             if self._skew(np.zeros_like(self.space.X), free, sliding, np.eye(len(self.loads))[k]) is not None:
-                raise ParameterError(f"the boundary {self.loads[k].boundary!r} of a filling encloses no volume: hold "
+                raise ParameterError(f"the boundary {load.boundary!r} of a filling encloses no volume: hold "
                                      f"its rim, or let it slide in planes of symmetry, or close it")
 
     def _skew(self, u: np.ndarray, free: np.ndarray, sliding: SlidingPlanes | None, p: np.ndarray) -> csr_array | None:
@@ -218,9 +212,7 @@ class FollowerLoads:
         if not self._fillings:
             return None
         columns = np.zeros((len(self._fillings), *self.space.X.shape))
-        for column, k in zip(columns, self._fillings):
-            load = self.loads[k]
-            assert isinstance(load, Filling)
+        for column, (k, load) in zip(columns, self._fillings):
             part = np.zeros_like(self._wet.X)
             add_pressure(self._wet.corner, np.where(self._wet.owner == k, load.compliance**-0.5, 0.0),
                          self._wet.X + u[self._wet.nodes], part)

@@ -125,13 +125,11 @@ class Loading:
 
     def knot(self, t: float) -> float:
         """The next knot after load time `t`, infinity if there is none [s]."""
-        i = bisect_right(self.knots, t)
-        return self.knots[i] if i < len(self.knots) else np.inf
+        return _after(self.knots, t)
 
     def corner(self, t: float) -> float:
         """The next corner after load time `t`, infinity if there is none [s]."""
-        i = bisect_right(self.corners, t)
-        return self.corners[i] if i < len(self.corners) else np.inf
+        return _after(self.corners, t)
 
     def velocity(self, t: float) -> np.ndarray:
         """Velocity of what is held, from load time `t` up to the next knot, (n, dim) [mm/s]; zero elsewhere.
@@ -193,6 +191,12 @@ class Loading:
     def pull(self, t: float) -> float:
         """Fastest change of a traction or a pressure from load time `t` on [MPa/s]."""
         return max((loads.rate(t) for loads in (self.dead, self.followers) if loads is not None), default=0.0)
+
+
+def _after(times: tuple[float, ...], t: float) -> float:
+    """The first of ascending times after t, infinity if there is none [s]."""
+    i = bisect_right(times, t)
+    return times[i] if i < len(times) else np.inf
 
 
 def _planes(space: Space, grips: Sequence[tuple[np.ndarray, Grip]]

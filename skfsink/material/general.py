@@ -120,7 +120,13 @@ def crossed(G: np.ndarray) -> np.ndarray:
 
 def cofactor(F: np.ndarray) -> np.ndarray:
     """cof F (..., 3, 3), also where F is singular."""
-    return np.stack([np.cross(F[..., (i + 1) % 3, :], F[..., (i + 2) % 3, :]) for i in range(3)], axis=-2)
+    out = np.empty_like(F)
+    for i in range(3):
+        b, c = (i + 1) % 3, (i + 2) % 3
+        for k in range(3):
+            m, n = (k + 1) % 3, (k + 2) % 3
+            out[..., i, k] = F[..., b, m] * F[..., c, n] - F[..., b, n] * F[..., c, m]
+    return out
 
 
 class _Invariants:

@@ -164,8 +164,7 @@ class Explicit:
         if grip >= self._knot:
             dt, grip = self._knot - state.grip, self._knot
         old, before = self.reaction, None if dead is None else dead.values
-        followers = self.momentum.followers
-        pressures = None if followers is None else followers.values
+        pressures = self.momentum.pressure_values
         self.momentum.set_time(grip)
         (u, v, a), du = self._next, self._du
         pace = self.loading.mean(state.grip, grip, dt) if self.loading.smooth else self._grip_velocity
@@ -191,7 +190,7 @@ class Explicit:
             drags = self.momentum.unheld(viscous), self.momentum.unheld(new_viscous)
             work = viscous_work(drags, (-self.mass[:, None] * state.a, net), self._inverse, du, dt)
             energy_fed_in += work
-        if dead is not None or followers is not None:
+        if dead is not None or pressures is not None:
             initial = max(abs(initial), present)
         if not self.length.accepts(energy_fed_in, energy, initial):
             self.momentum.set_time(state.grip)

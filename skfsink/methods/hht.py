@@ -97,7 +97,7 @@ class HHT:
         self.momentum.set_time(state.grip)
         self.momentum.set_gamma(state.gamma, state.deleted)
         force, viscous = self._forces(state)
-        self._loads, self._pressures = self._dead_loads, self._pressures_now
+        self._loads, self._pressures = self._dead_loads, self.momentum.pressure_values
         self._now = Balance(force, -self.momentum.unheld(force).ravel()[self.free], self.momentum.gamma,
                             self.momentum.W, self.inertia.matrix(), self.inertia.places(), viscous)
 
@@ -184,10 +184,6 @@ class HHT:
     def _dead_loads(self) -> np.ndarray | None:
         return None if self.momentum.dead is None else self.momentum.dead.values
 
-    @property
-    def _pressures_now(self) -> np.ndarray | None:
-        return None if self.momentum.followers is None else self.momentum.followers.values
-
     def _book_loads(self, state: State) -> None:
         """Work of the dead loads that have changed at fixed displacement, as where elements under them are gone."""
         if self.momentum.dead is not None and self._loads is not None:
@@ -206,7 +202,7 @@ class HHT:
                      self.body.least_energy)
         if not state.ledger.numerical - ledger.numerical <= self.controls.gain_tolerance * energy:
             return False
-        state.ledger, self._loads, self._pressures = ledger, loads, self._pressures_now
+        state.ledger, self._loads, self._pressures = ledger, loads, momentum.pressure_values
         self._rate = (trial.u - state.u) / dt
         state.u, state.gamma, state.sink = trial.u, trial.density.gamma, trial.density.sink
         state.a, state.v = trial.a.copy(), v

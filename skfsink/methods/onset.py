@@ -190,7 +190,7 @@ class StaticLoading:
         ConvergenceError
             There is no equilibrium under the smallest increment.
         """
-        c, dead, followers = self.controls, self.momentum.dead, self.momentum.followers
+        c, dead = self.controls, self.momentum.dead
         ledger, self.unfailed = state.ledger, ""
         held = ~self.free.reshape(state.u.shape)
         self.momentum.set_time(state.grip)
@@ -208,7 +208,7 @@ class StaticLoading:
             increment = self.increment if end == state.grip + self.increment else end - state.grip
             self.momentum.set_gamma(state.gamma, state.deleted)  # the loads of an increment given up were of its gamma
             before = None if dead is None else dead.values
-            pressures = None if followers is None else followers.values
+            pressures = self.momentum.pressure_values
             self.momentum.set_time(end)
             try:
                 settled = self._settle(state, self._predict(state.u, increment, state.grip))

@@ -150,8 +150,7 @@ class Statics(StaticLoading):
         end = self.clock.end(state.grip, increment)
         increment = increment if end == state.grip + increment else end - state.grip
         before = None if dead is None else dead.values
-        followers = self.momentum.followers
-        pressures = None if followers is None else followers.values
+        pressures = self.momentum.pressure_values
         self.momentum.set_time(end)
         u, new_force = self.newton.equilibrium(self._predict(state.u, increment, state.grip), most=self.SNAP)
         state.ledger.work += 0.5 * float(np.sum((force + new_force)[held] * (u - state.u)[held]))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import io
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import OutputError
-from ..system.files import reported, write_atomic
+from ..system.files import write_atomic
+from .rows import append_rows, csv_text, finished_lines
 
 __all__ = ["FRAGMENTS", "append_fragments", "fragment_columns", "read_fragments", "write_fragments"]
 
@@ -33,23 +33,16 @@ def fragment_columns(dim: int) -> list[str]:
 def write_fragments(path: Path, dim: int, rows: np.ndarray) -> None:
     """Write the file anew with `rows` (m, columns): step, time, and the columns of :func:`fragment_columns`."""
     header = ["step", "time_s", *fragment_columns(dim)]
-    write_atomic(path, _csv([header]) + _csv(_cells(rows, header)))
+    write_atomic(path, csv_text([header, *_cells(rows, header)]))
 
 
 def append_fragments(path: Path, dim: int, rows: np.ndarray) -> None:
     """Add rows to the file (OutputError)."""
-    with reported(f"cannot write {path}"), open(path, "a", encoding="utf-8", newline="") as file:
-        file.write(_csv(_cells(rows, ["step", "time_s", *fragment_columns(dim)])))
+    append_rows(path, _cells(rows, ["step", "time_s", *fragment_columns(dim)]))
 
 
 def _cells(rows: np.ndarray, header: Sequence[str]) -> list[list[Any]]:
     return [[int(value) if name in _WHOLE else value for name, value in zip(header, row)] for row in rows.tolist()]
-
-
-def _csv(rows: Sequence[Any]) -> str:
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows(rows)
-    return text.getvalue()
 
 
 def read_fragments(path: Path) -> dict[str, np.ndarray]:
@@ -60,10 +53,9 @@ def read_fragments(path: Path) -> dict[str, np.ndarray]:
     OutputError
         The file cannot be read, or is none of fragments.
     """
-    with reported(f"cannot read {path}"):
-        text = path.read_text(encoding="utf-8", errors="replace")
+    text = finished_lines(path)
     try:
-        header, *lines = csv.reader(text[:text.rfind("\n") + 1].splitlines())
+        header, *lines = csv.reader(text)
         if header[2:] not in (fragment_columns(2), fragment_columns(3)) or any(len(x) != len(header) for x in lines):
             raise ValueError
         return {name: np.array([line[i] for line in lines], str).astype(int if name in _WHOLE else float)

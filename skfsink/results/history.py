@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import io
 import math
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
@@ -12,7 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import OutputError
-from ..system.files import reported, write_atomic
+from ..system.files import write_atomic
+from .rows import append_rows, csv_text, finished_lines
 
 __all__ = ["HISTORY_COLUMNS", "OF_PRESSURES", "Column", "History", "Table", "deletions_header", "history_header",
            "history_units", "load_name", "onset_load"]
@@ -157,7 +157,7 @@ class History:
         self.rows = [_row(row) for row in rows]
         self._written = [name for name in HISTORY_COLUMNS if name not in without]
         header = [name for name, column in zip(history_header(dim), HISTORY_COLUMNS) if column in self._written]
-        write_atomic(self.path, _csv([header, *map(self._cells, self.rows)]))
+        write_atomic(self.path, csv_text([header, *map(self._cells, self.rows)]))
 
     def _cells(self, row: Mapping[str, Any]) -> list[Any]:
         return [row[name] for name in self._written]
@@ -166,8 +166,7 @@ class History:
         """Add a row. Columns that it leaves out are as :attr:`Column.before` says, else NaN, and counts 0; an unknown
         column is a KeyError."""
         self.rows.append(_row(row))
-        with reported(f"cannot write {self.path}"), open(self.path, "a", encoding="utf-8", newline="") as file:
-            file.write(_csv([self._cells(self.rows[-1])]))
+        append_rows(self.path, [self._cells(self.rows[-1])])
 
     def columns(self) -> Table:
         """The columns as arrays (rows,): `phase` of str, counts of int64, all others of float64."""
@@ -186,10 +185,9 @@ class History:
         OutputError
             The file cannot be read, is not a history, or has not all columns.
         """
-        with reported(f"cannot read the history {path}"):
-            text = Path(path).read_text(encoding="utf-8", errors="replace")
+        text = finished_lines(path, "the history ")
         try:
-            header, *lines = csv.reader(text[:text.rfind("\n") + 1].splitlines())
+            header, *lines = csv.reader(text)
             known, dim = _known(header)
             values = {name: [line[i] for line in lines] for name, i in known.items()}
             columns = _columns({name: values.get(name, [column.before] * len(lines))
@@ -237,12 +235,6 @@ def _row(values: Mapping[str, Any]) -> dict[str, Any]:
         raise KeyError(f"the history has no column {', '.join(sorted(unknown))}")
     return {name: column.kind(values.get(name, _MISSING[column.kind] if column.before is None else column.before))
             for name, column in HISTORY_COLUMNS.items()}
-
-
-def _csv(rows: Sequence[Any]) -> str:
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows(rows)  # floats are written by repr, which loses no bit
-    return text.getvalue()
 
 
 def _columns(values: Mapping[str, Sequence[Any]]) -> dict[str, np.ndarray]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import OutputError
-from ..system.files import reported, write_atomic
+from ..system.files import write_atomic
+from .rows import append_rows, csv_text, finished_lines
 
 __all__ = ["PROBES", "ProbeFile", "ProbeTable", "column_name", "read_probes"]
 
@@ -43,22 +43,15 @@ class ProbeFile:
 
     def __init__(self, path: Path, columns: Sequence[str], rows: np.ndarray) -> None:
         self.path = path
-        write_atomic(path, _csv([[*FIRST, *columns], *_cells(rows)]))
+        write_atomic(path, csv_text([[*FIRST, *columns], *_cells(rows)]))
 
     def append(self, rows: np.ndarray) -> None:
         """Add rows (m, columns): number of the phase in `PHASES`, step, time [s], displacement [mm], and the values."""
-        with reported(f"cannot write {self.path}"), open(self.path, "a", encoding="utf-8", newline="") as file:
-            file.write(_csv(_cells(rows)))
+        append_rows(self.path, _cells(rows))
 
 
 def _cells(rows: np.ndarray) -> list[list[Any]]:
     return [[PHASES[int(row[0])], int(row[1]), *row[2:]] for row in rows.tolist()]
-
-
-def _csv(rows: Sequence[Any]) -> str:
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows(rows)
-    return text.getvalue()
 
 
 class ProbeTable(dict[str, np.ndarray]):
@@ -100,10 +93,9 @@ def read_probes(folder: Path) -> dict[str, ProbeTable]:
 
 
 def _read(path: Path) -> ProbeTable:
-    with reported(f"cannot read {path}"):
-        text = path.read_text(encoding="utf-8", errors="replace")
+    text = finished_lines(path)
     try:
-        header, *lines = csv.reader(text[:text.rfind("\n") + 1].splitlines())
+        header, *lines = csv.reader(text)
         if tuple(header[:len(FIRST)]) != FIRST or any(len(line) != len(header) for line in lines):
             raise ValueError
         kinds: dict[str, Any] = {"phase": str, "step": int}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import io
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import OutputError
-from ..system.files import reported, write_atomic
+from ..system.files import write_atomic
+from .rows import csv_text, finished_lines
 
 __all__ = ["RELEASE", "load_release", "release_header", "write_release"]
 
@@ -34,12 +34,8 @@ def release_header(dim: int, clock: str) -> list[str]:
 
 def write_release(path: str | Path, header: Sequence[str], rows: Sequence[Sequence[Any]]) -> None:
     """Write the rows; numbers that are none stay empty."""
-    buffer = io.StringIO()
-    writer = csv.writer(buffer, lineterminator="\n")
-    writer.writerow(header)
-    writer.writerows([["" if isinstance(value, float) and math.isnan(value) else value for value in row]
-                      for row in rows])
-    write_atomic(path, buffer.getvalue().encode())
+    cells = [["" if isinstance(value, float) and math.isnan(value) else value for value in row] for row in rows]
+    write_atomic(path, csv_text([header, *cells]))
 
 
 def load_release(path: str | Path) -> dict[str, np.ndarray]:
@@ -50,10 +46,9 @@ def load_release(path: str | Path) -> dict[str, np.ndarray]:
     OutputError
         The file cannot be read, or is none of energy release rates.
     """
-    with reported(f"cannot read the energy release rates {path}"):
-        text = Path(path).read_text(encoding="utf-8", errors="replace")
+    text = finished_lines(path, "the energy release rates ")
     try:
-        header, *lines = csv.reader(text.splitlines())
+        header, *lines = csv.reader(text)
         if header not in [release_header(dim, clock) for dim in (2, 3) for clock in ("s", "pass")]:
             raise ValueError(header)
         columns = {name: [line[i] for line in lines] for i, name in enumerate(header)}

@@ -47,16 +47,15 @@ INCREMENT = 0.05                  # of the load
 AXES = "xyz"
 
 
-def annulus(n: int, layers: int, ratio: float) -> Space:
-    """Quarter of a ring of the radii HOLE and `ratio` HOLE, 2 n elements around, graded across."""
-    r = HOLE * ratio ** np.linspace(0, 1, layers + 1)
-    mesh = skfem.MeshQuad.init_tensor(r, np.linspace(0, np.pi / 2, 2 * n + 1))
+def annulus(n: int, radii: np.ndarray) -> Space:
+    """Quarter of a ring with layers between these `radii`, 2 n elements around."""
+    mesh = skfem.MeshQuad.init_tensor(radii, np.linspace(0, np.pi / 2, 2 * n + 1))
     r, angle = mesh.p
     return Space(skfem.MeshQuad(np.array([r * np.cos(angle), r * np.sin(angle)]), mesh.t))
 
 
-def octant(n: int, layers: int, ratio: float) -> Space:
-    """Octant of a hollow ball of these radii: three patches of n x n faces, graded across."""
+def octant(n: int, radii: np.ndarray) -> Space:
+    """Octant of a hollow ball with layers between these `radii`, of three patches of n x n faces."""
     line = np.linspace(0, 1, n + 1)
     patch = skfem.MeshQuad.init_tensor(line, line)
     a, b = np.tan(patch.p * np.pi / 4)
@@ -65,9 +64,8 @@ def octant(n: int, layers: int, ratio: float) -> Space:
     t = np.hstack([patch.t + k * a.size for k in range(3)])
     _, first, number = np.unique(np.round(p, 9), axis=1, return_index=True, return_inverse=True)
     p, t = p[:, first], number.ravel()[t]
-    radii = HOLE * ratio ** np.linspace(0, 1, layers + 1)
     X = np.hstack([r * p for r in radii])
-    cells = np.hstack([np.vstack([t + i * p.shape[1], t + (i + 1) * p.shape[1]]) for i in range(layers)])
+    cells = np.hstack([np.vstack([t + i * p.shape[1], t + (i + 1) * p.shape[1]]) for i in range(len(radii) - 1)])
     return Space(from_meshio(meshio.Mesh(X.T, [("hexahedron", cells.T)])))
 
 
@@ -91,7 +89,8 @@ class Void:
     def __call__(self) -> dict[str, Any]:
         """Greatest tension [MPa], stretch of the hole there, closed form, and why it went no further."""
         ratio, (n, layers) = RATIO, MESHES[self.kind == "ball"]
-        space = (octant if self.kind == "ball" else annulus)(n << self.level, layers << self.level, ratio)
+        radii = HOLE * ratio ** np.linspace(0, 1, (layers << self.level) + 1)
+        space = (octant if self.kind == "ball" else annulus)(n << self.level, radii)
         radius = np.linalg.norm(space.X, axis=1)
         outer, inner = (np.flatnonzero(np.isclose(radius, r)) for r in (HOLE * ratio, HOLE))
         dim = space.dim

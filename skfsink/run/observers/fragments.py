@@ -11,7 +11,7 @@ from ...fields.body import Body
 from ...fields.pieces import pieces_of
 from ...fields.state import State
 from ...results.fragments import FRAGMENTS, append_fragments, fragment_columns, write_fragments
-from .observer import Observer
+from .observer import Recorder
 from .view import View
 
 __all__ = ["Fragments", "fragment_summary"]
@@ -24,13 +24,14 @@ def _rows(body: Body, state: State) -> np.ndarray:
         part if part.ndim == 2 else part[:, None] for part in found)])
 
 
-class Fragments(Observer):
+class Fragments(Recorder):
     """Writes `fragments.csv`, the pieces of the body at the end of the run, and at its looks: a row for each piece.
 
     Pieces are numbered at each look, the heaviest first. That of every run looks at the end alone; one with `every`, or
     `every_passes` in a quasi-static event, takes its place.
 
-    Memory: the `rows` so far; `look`, `unfailed` and `finish` add to them.
+    Memory: the `rows` so far (step, time [s], and the columns of :func:`.fragment_columns`); `look`, `unfailed` and
+    `finish` add to them.
 
     Parameters
     ----------
@@ -38,21 +39,10 @@ class Fragments(Observer):
     every_passes: passes between two looks in a quasi-static event; None looks at the end alone.
     """
 
-    kept = ("rows",)
-
     def __init__(self, every: float | None = None, every_passes: int | None = None) -> None:
+        super().__init__()
         self.every = every
         self._passes, self.every_passes = every_passes, 1 if every_passes is None else every_passes
-        self._rows: list[np.ndarray] = []
-
-    @property
-    def rows(self) -> np.ndarray:
-        """The rows so far, (m, columns): step, time [s], and the columns of :func:`.fragment_columns`."""
-        return np.concatenate(self._rows) if self._rows else np.zeros((0, 0))
-
-    @rows.setter
-    def rows(self, rows: np.ndarray) -> None:
-        self._rows = [rows] if rows.size else []
 
     def prepare(self, view: View) -> None:
         """Begin the file with the rows so far."""

@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, TypeVar
 
+import numpy as np
+
 from ...errors import CheckpointError, ParameterError
 from ...scene.scene import Scene
 from ...scene.schedule import Schedule, check_observers
 from ..checkpoint import storable
 from .view import View
 
-__all__ = ["Observer", "Observers"]
+__all__ = ["Observer", "Observers", "Recorder"]
 
 Kind = TypeVar("Kind", bound="Observer")
 
@@ -108,6 +110,27 @@ class Observer(Schedule):
                                   f"the class the run was begun with, or begin anew")
         for name in self.kept:
             setattr(self, name, memory[name])
+
+
+class Recorder(Observer):
+    """Base of the observers that keep a table, of which each look adds some rows to `_rows`.
+
+    Memory: the `rows` so far, as :class:`Observer` says.
+    """
+
+    kept = ("rows",)
+
+    def __init__(self) -> None:
+        self._rows: list[np.ndarray] = []
+
+    @property
+    def rows(self) -> np.ndarray:
+        """The rows so far, (m, columns)."""
+        return np.concatenate(self._rows) if self._rows else np.zeros((0, 0))
+
+    @rows.setter
+    def rows(self, rows: np.ndarray) -> None:
+        self._rows = [rows] if rows.size else []
 
 
 def _place(observer: Observer, standard: Sequence[Observer]) -> str:

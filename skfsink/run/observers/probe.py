@@ -16,7 +16,7 @@ from ...fields.quantities import USUAL, quantities_of
 from ...results.probes import PHASES, PROBES, ProbeFile, column_name
 from ...scene.scene import Scene
 from ...system.files import prepare_folder
-from .observer import Observer
+from .observer import Recorder
 from .view import View
 
 __all__ = ["LineProbe", "MeanProbe", "PointProbe", "Probe", "position_of"]
@@ -25,13 +25,14 @@ _AXES = ("x", "y", "z")
 Columns = Sequence[tuple[str, str]]  # names and units
 
 
-class Probe(Observer):
+class Probe(Recorder):
     """Base of the probes: writes `probes/NAME.csv`, a row at each look, in the loading after each increment.
 
     It looks in the event as the history does, or every so often, and where the crack branches or arrives. A class that
     derives from it says in `_prepared` what it follows, with columns and units, and in `_values` their values.
 
-    Memory: the `rows` so far; what `open` finds in the scene is used by `prepare`, `loading`, `look` and `unfailed`.
+    Memory: the `rows` so far, as :meth:`.ProbeFile.append` takes them; what `open` finds in the scene is used by
+    `prepare`, `loading`, `look` and `unfailed`.
 
     Parameters
     ----------
@@ -45,28 +46,17 @@ class Probe(Observer):
         It has no such name.
     """
 
-    kept = ("rows",)
-
     def __init__(self, name: str, *, every: float | None = None, every_passes: int = 1) -> None:
         if not isinstance(name, str) or not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]{0,59}", name):
             raise ParameterError(f"the name of a probe must be up to 60 letters, digits and . _ -, as it is that of a "
                                  f"file; got {name!r:.80}")
+        super().__init__()
         self.label, self.every, self.every_passes = name, every, every_passes
-        self._rows: list[np.ndarray] = []
 
     @property
     def name(self) -> str:
         """What a checkpoint calls it."""
         return f"probe {self.label}"
-
-    @property
-    def rows(self) -> np.ndarray:
-        """The rows so far, (m, columns): as :meth:`.ProbeFile.append` takes them."""
-        return np.concatenate(self._rows) if self._rows else np.zeros((0, 0))
-
-    @rows.setter
-    def rows(self, rows: np.ndarray) -> None:
-        self._rows = [rows] if rows.size else []
 
     # --- what it follows ---
     @abstractmethod
