@@ -16,9 +16,9 @@ __all__ = ["Backend", "BulkViscosity", "DensityBackend", "MomentumBackend", "Par
 
 
 class Part(NamedTuple):
-    """Elements of one material: their numbers (None: the whole body), and the directions of their fibres, if any.
+    """Elements of one material: their numbers, ascending, and the directions of their fibres, if any.
 
-    `fibres` is (elements, families, 3); it is None for a law of I1' alone.
+    `elements` is None for the whole body. `fibres` is (elements, families, 3); it is None for a law of I1' alone.
     """
 
     material: Material
@@ -37,10 +37,7 @@ def among(parts: Sequence[Part], elements: np.ndarray) -> Iterator[tuple[Part, n
         if not here.size:
             continue
         own = elements[here]
-        if part.elements is not None:
-            order = np.argsort(part.elements)
-            own = order[np.searchsorted(part.elements, own, sorter=order)]
-        yield part, here, own
+        yield part, here, own if part.elements is None else np.searchsorted(part.elements, own)
 
 
 class MomentumBackend(Protocol):
