@@ -20,6 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..errors import ParameterError
 from ..fem.backend import Part, among
 from ..material import GeneralMaterial, Material
 from ..material.crushed import J_FLOOR, crushed
@@ -71,8 +72,17 @@ def configurational_forces(momentum: Momentum, u: np.ndarray) -> np.ndarray:
 
 
 def point_stress(momentum: Momentum, u: np.ndarray, elements: np.ndarray, gamma: np.ndarray) -> PointStress:
-    """Energy and stress of `elements` (m,) at the displacement `u` (n, dim), for the density `gamma` (m, nq)."""
+    """Energy and stress of `elements` (m,) at the displacement `u` (n, dim), for the density `gamma` (m, nq).
+
+    Raises
+    ------
+    ParameterError
+        The body is one of revolution, whose tensor has a part around the axis besides.
+    """
     space, dim = momentum.space, momentum.space.dim
+    if space.axisymmetric:
+        raise ParameterError("the energy release rate is not made for element axisymmetric: take the energies of two "
+                             "cracks, or a mesh in space")
     H = np.swapaxes(u[space.conn[elements]], 1, 2)[:, None] @ space.dN[elements]
     found = PointStress(np.zeros_like(gamma), np.zeros_like(gamma), np.zeros_like(H), H)
     for part, rows, own in among(momentum.parts, elements):
