@@ -112,20 +112,20 @@ def pressure_tangents(facets, p, x, out, revolved):  # type: ignore[no-untyped-d
     """out (f, k*dim, k*dim) = derivative of p int N_a n da with the positions of the nodes; not symmetric."""
     out[...] = 0.0
     if revolved:
-        N = np.empty(2)
+        shape = np.empty(2)
         for f in range(facets.shape[0]):
             one, two = facets[f, 0], facets[f, 1]
             er, ez = x[two, 0] - x[one, 0], x[two, 1] - x[one, 1]
             for s in GAUSS:
-                N[0], N[1] = 1.0 - s, s
-                r = N[0] * x[one, 0] + N[1] * x[two, 0]
+                shape[0], shape[1] = 1.0 - s, s
+                r = shape[0] * x[one, 0] + shape[1] * x[two, 0]
                 for a in range(2):
-                    c = np.pi * p[f] * N[a]
+                    c = np.pi * p[f] * shape[a]
                     for b in range(2):
                         turn = c * r if b == 1 else -c * r
-                        out[f, 2 * a, 2 * b] += c * N[b] * ez
+                        out[f, 2 * a, 2 * b] += c * shape[b] * ez
                         out[f, 2 * a, 2 * b + 1] += turn
-                        out[f, 2 * a + 1, 2 * b] -= turn + c * N[b] * er
+                        out[f, 2 * a + 1, 2 * b] -= turn + c * shape[b] * er
         return
     if facets.shape[1] == 2:
         for f in range(facets.shape[0]):
