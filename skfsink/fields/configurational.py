@@ -103,7 +103,7 @@ def _of_part(momentum: Momentum, part: Part, own: np.ndarray, F: np.ndarray,
     cof = cofactor(F)
     J = np.einsum("...J,...J", F[..., 0, :], cof[..., 0, :])
     k, J_bar, gamma_bar = material.bulk_modulus, J, gamma
-    if momentum.element == "jbar":
+    if momentum.j_bar:
         J_bar, gamma_bar = ((w * a).sum(axis=1, keepdims=True) / w.sum(axis=1, keepdims=True) for a in (J, gamma))
     p = gamma_bar * k * (J_bar - 1)
     F = np.where((gamma > 0)[..., None, None], F, np.eye(3))  # a dead point may have any shape

@@ -67,7 +67,8 @@ class Momentum:
                  threads: int = 1, *, regions: Sequence[Region] = (), dead: NodalLoads | None = None,
                  followers: FollowerLoads | None = None, kernels: str = "compiled",
                  bulk_viscosity: BulkViscosity = BulkViscosity()) -> None:  # noqa: B008
-        self.plane_stress = check_element(element, space, kernels).thin_sheet
+        made = check_element(element, space, kernels)
+        self.plane_stress, self.j_bar = made.thin_sheet, made.j_bar
         self.space, self.material, self.element, self.force_floor = space, material, element, force_floor
         self.parts = self._divide(regions)
         materials = [part.material for part in self.parts]
