@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 import copy
+from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
+import meshio
 import numpy as np
 import pytest
 import skfem
 from bodies import Loadable, box, ends, held_body, notched
+from guarded import Stop
+from plates import deck, invoke_program
+from test_pressure import INNER, tube
 
+from skfsink.cases.cylindrical_shell import cylindrical_shell
+from skfsink.cases.symmetric_double_edge_notch import symmetric_double_edge_notch
+from skfsink.errors import Interrupted, ParameterError
 from skfsink.fem.space import Space
 from skfsink.fields.density import DensitySolver
 from skfsink.fields.momentum import Momentum
@@ -18,9 +27,14 @@ from skfsink.fields.state import State
 from skfsink.loads.grips import Grip, Sliding
 from skfsink.loads.schedule import Loading
 from skfsink.material import AAA, SinkLaw
+from skfsink.meshing.vtu import write_mesh
 from skfsink.methods.controls import ExplicitControls, HHTControls
 from skfsink.methods.explicit import Explicit
 from skfsink.methods.hht import HHT
+from skfsink.results.loader import load
+from skfsink.run.observers.places import rim_of
+from skfsink.scene.deck import read_deck
+from skfsink.scene.options import Options
 
 ANGLE = 0.08  # of the wedge [rad]
 
@@ -138,3 +152,105 @@ def test_a_free_body_keeps_its_momentum_along_the_axis(hht: bool) -> None:
     assert pieces.volume[0] == pytest.approx(np.pi, rel=1e-12) and pieces.extent[0] == pytest.approx(1.0, rel=1e-12)
     assert pieces.translation[0] == pytest.approx(0.5 * before**2 / pieces.mass[0], rel=1e-5)
     assert pieces.kinetic[0] > 1.001 * pieces.translation[0] and not state.u[space.on_axis, 0].any()
+
+
+# --- decks ---
+#: a hollow ball, half of it, with a cut at its outer surface in the plane of symmetry
+BALL = '''case = "custom"
+[parameters]
+mesh = "ball.vtu"
+element = "axisymmetric"
+length_scale = "0.12 mm"
+event_time = "15 µs"
+[[grips]]
+boundary = "bottom"
+y = 0
+[[pressures]]
+boundary = "inner"
+rate = "10 kPa/s"
+in_crack = true
+[[cracks]]
+name = "cut"
+points = [["1.2 mm", "0.01 mm"], ["1.5 mm", "0.01 mm"]]
+lips = "whole"
+[[probes]]
+name = "cavity"
+kind = "volume"
+boundary = "inner"
+every = "1 µs"
+[[probes]]
+name = "wall"
+kind = "point"
+position = ["0.6 mm", "1.1 mm"]
+quantity = "stress, stretches"
+every = "1 µs"
+'''
+
+
+def write_ball(path: Path) -> None:
+    """Mesh file of a quarter of a ring, which makes half of a hollow ball."""
+    space = tube(5)
+    inner = np.flatnonzero(np.isclose(np.linalg.norm(space.X, axis=1), INNER))
+    points = np.column_stack([space.X, np.zeros(space.n_nodes)])
+    write_mesh(path, meshio.Mesh(points, [("quad", space.mesh.t.T)], point_sets={"inner": inner}))
+
+
+def test_a_deck_of_a_ball(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fails if files do not speak of the whole body, the axis is an edge, or a resumed run has other bits."""
+    monkeypatch.chdir(tmp_path)
+    write_ball(tmp_path / "ball.vtu")
+    read_deck(deck(tmp_path, BALL)).run(out=tmp_path / "whole", quiet=True)
+    run = load(tmp_path / "whole")
+    units = run.history.units
+    assert run.history.dim == 3 and (units["elastic"], units["swept_volume"]) == ("N mm", "mm^3")
+    assert "reaction_N" in run.summary["onset"] and run.summary["units"] == {"load": "N", "energy": "N mm"}
+    assert run.summary["onset"]["boundary"] == "cut" and run.summary["energy"]["balance_error_relative"] < 1e-6
+    header, first, *_ = (tmp_path / "whole" / "probes" / "cavity.csv").read_text().splitlines()
+    volume = float(first.split(",")[header.split(",").index("volume_mm3")])
+    n = 5  # chords of the arc: 2n cones
+    a = np.linspace(0.0, np.pi / 2, 2 * n + 1)
+    r, z = INNER * np.cos(a), INNER * np.sin(a)
+    undeformed = np.pi / 3 * ((r[1:]**2 + r[1:] * r[:-1] + r[:-1]**2) * np.diff(z)).sum()
+    assert undeformed == pytest.approx(2 / 3 * np.pi, rel=0.02) and 1.01 * undeformed < volume < 1.6 * undeformed
+    frame = meshio.read(tmp_path / "whole" / "series" / "run_0000.vtu")
+    stress = frame.cell_data["stress"][0]
+    far = frame.points[frame.cells_dict["quad"]].mean(axis=1)[:, 1] > 0.9
+    hoop, shear = stress[far, 2], stress[far, 3]
+    assert (hoop > 0.1).all() and np.abs(shear).max() < hoop.max()
+    (rim, planes), on_axis = rim_of(run.scene), run.scene.space.on_axis
+    assert on_axis[rim].sum() == 2 and any(on_axis[plane.nodes].all() for plane in planes)
+    pieces = (tmp_path / "whole" / "fragments.csv").read_text().splitlines()[0]
+    assert "volume_mm3" in pieces and "mass_t," in pieces and "centre_x_mm" in pieces
+    broken = read_deck(deck(tmp_path, BALL))
+    with pytest.raises(Interrupted):
+        broken.run(out=tmp_path / "broken", quiet=True, observers=(Stop(30),))
+    broken.run(resume=tmp_path / "broken", quiet=True)
+    for name in ("history.csv", "deletions.csv", "fragments.csv"):
+        assert (tmp_path / "broken" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes(), name
+
+
+@pytest.mark.parametrize(("change", "message"), [
+    (("[[cracks]]", '[[probes]]\nname = "G"\nkind = "release_rate"\nevery = "1 µs"\n[[cracks]]'),
+     "EnergyRelease is not made for element axisymmetric"),
+    (('event_time', 'contact = true\nevent_time'), "contact is for elements jbar and plain; got axisymmetric"),
+    (("[[pressures]]", '[[grips]]\nboundary = "left"\nx = 1e-3\n[[pressures]]'), "of revolution, along x: leave x out"),
+    (("[[cracks]]", '[[body_forces]]\nx = "1 m/s^3"\n[[cracks]]'), "a body force on a body of revolution acts along"),
+    (('"axisymmetric"', '"axisymmetrical"'), "axisymmetric"),
+])
+def test_one_line_says_what_cannot_be(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, change: tuple[str, str],
+                                      message: str) -> None:
+    """Fails if what a body of revolution cannot have is taken, or refused in more than a line."""
+    monkeypatch.chdir(tmp_path)
+    write_ball(tmp_path / "ball.vtu")
+    status, err, _ = invoke_program("run", deck(tmp_path, BALL.replace(*change, 1)), "--out", "run", "--quiet")
+    assert status != 0 and message in err and err.count("\n") == 1
+
+
+def test_a_solid_is_no_half_plane(tmp_path: Path) -> None:
+    """Fails if a case in space, or a half cut along the radius, is taken for a body of revolution."""
+    options = Options(element="axisymmetric", out=tmp_path / "run", quiet=True)
+    with pytest.raises(ParameterError, match="axisymmetric is for meshes of quadrilaterals"):
+        cylindrical_shell(options=options)
+    with pytest.raises(ParameterError, match="which is not cut along x: leave half out"):
+        symmetric_double_edge_notch(options=replace(options, half=True))
+    assert not options.out.exists()
