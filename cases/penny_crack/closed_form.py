@@ -1,4 +1,4 @@
-"""The energy release rate of the penny-shaped crack against linear elasticity: `python cases/penny_crack/closed_form.py`.
+"""The energy release rate of a penny-shaped crack beside linear elasticity: `python cases/penny_crack/closed_form.py`.
 
 In an infinite body under the stress s across the crack, of radius a (Sneddon 1946; in a cylinder of radius b the factor
 F of Tada, Paris and Irwin multiplies K),
@@ -59,7 +59,7 @@ def pulled(mesh: str, count: int, displacement: float, steps: int = 1) -> tuple[
 
 
 def released(mesh: str, displacement: float, radius: float = 0.5, steps: int = 1) -> tuple[float, float, float]:
-    """G [N/mm] between two cracks as near to `radius` [mm] as the mesh has them, their mean radius, and the load [N]."""
+    """G [N/mm] between two cracks as near to `radius` [mm] as the mesh has them, their mean radius, the load [N]."""
     across = len(np.unique(file_sample(MESHES / f"{mesh}.vtu").space.X[:, 0])) - 1
     count = round(radius * across / RADIUS - 0.5)
     (a, first, load), (b, second, other) = (pulled(mesh, n, displacement, steps) for n in (count, count + 1))
