@@ -230,8 +230,6 @@ def test_a_deck_of_a_ball(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
 
 
 @pytest.mark.parametrize(("change", "message"), [
-    (("[[cracks]]", '[[probes]]\nname = "G"\nkind = "release_rate"\nevery = "1 µs"\n[[cracks]]'),
-     "EnergyRelease is not made for element axisymmetric"),
     (('event_time', 'contact = true\nevent_time'), "contact is for elements jbar and plain; got axisymmetric"),
     (("[[pressures]]", '[[grips]]\nboundary = "left"\nx = 1e-3\n[[pressures]]'), "of revolution, along x: leave x out"),
     (("[[cracks]]", '[[body_forces]]\nx = "1 m/s^3"\n[[cracks]]'), "a body force on a body of revolution acts along"),

@@ -38,9 +38,9 @@ class Element(NamedTuple):
 ELEMENTS: dict[str, Element] = {
     "jbar": Element(partial(momentum_forms, j_bar=True), j_bar=True, compiled=True),
     "plain": Element(partial(momentum_forms, j_bar=False), compiled=True),
+    "planestress": Element(plane_stress_forms, dimensions=(2,), thin_sheet=True, compiled=True),
     "axisymmetric": Element(partial(momentum_forms, j_bar=True), dimensions=(2,), axisymmetric=True, j_bar=True,
                             compiled=True),
-    "planestress": Element(plane_stress_forms, dimensions=(2,), thin_sheet=True, compiled=True),
 }
 
 

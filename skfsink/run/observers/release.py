@@ -48,7 +48,7 @@ class EnergyRelease(Observer):
     Raises
     ------
     ParameterError
-        A parameter is out of its range, or, when a run begins, its body is viscous or one of revolution.
+        A parameter is out of its range, or, when a run begins, its body is viscous.
     """
 
     kept = ("rows", "trails")
@@ -61,11 +61,8 @@ class EnergyRelease(Observer):
         self.trails: dict[str, list[list[float]]] = {}  #: [time, x, y(, z)] of each tip, by its number
 
     def open(self, view: View, memory: Mapping[str, Any] | None = None) -> None:
-        """Refuse a viscous body, and one of revolution; take up the rows so far."""
+        """Refuse a viscous body; take up the rows so far."""
         super().open(view, memory)
-        if view.body.space.axisymmetric:
-            raise ParameterError("EnergyRelease is not made for element axisymmetric: take the energies of two cracks, "
-                                 "or a mesh in space")
         if view.body.momentum.is_viscous and not view.quasistatic:
             raise ParameterError("EnergyRelease cannot look at a viscous body: what viscosity takes on the way to the "
                                  "tip makes G depend on the domain; leave the viscosity out")
