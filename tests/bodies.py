@@ -61,7 +61,8 @@ class Loadable:
 
     def __init__(self, space: Space, loading: Loading, material: Material, law: SinkLaw, **controls: Any) -> None:
         self.space, self.loading = space, loading
-        self.momentum = Momentum(space, material, dead=loading.dead, followers=loading.followers)
+        element = "axisymmetric" if space.axisymmetric else "jbar"
+        self.momentum = Momentum(space, material, element, dead=loading.dead, followers=loading.followers)
         self.body = Body(self.momentum, DensitySolver(space, law), loading)
         self.statics = Statics(self.body, StaticsControls(**controls))
         self.state = State.intact(space)

@@ -314,7 +314,7 @@ def test_unused_nodes_triangles_and_nan_are_refused(kind: str):
         Space(type(mesh)(p, mesh.t, validate=False))
     with pytest.raises(MeshError, match="MeshTri1"):
         Space(skfem.MeshTri())
-    with pytest.raises(ParameterError, match="element must be one of jbar, plain, planestress; got 'q2'"):
+    with pytest.raises(ParameterError, match="element must be one of jbar, plain, planestress, axisymmetric; got 'q2'"):
         Momentum(Space(mesh), AAA(), "q2")
 
 

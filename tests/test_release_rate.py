@@ -207,16 +207,19 @@ def test_rotated_body_has_the_same_rate(material: Material, element: str) -> Non
 # --- configurational forces ---
 def with_nodes_at(space: Space, X: np.ndarray) -> Space:
     """The same elements on other nodes."""
-    return Space(type(space.mesh)(X.T.copy(), space.mesh.t))
+    return Space(type(space.mesh)(X.T.copy(), space.mesh.t), axisymmetric=space.axisymmetric)
 
 
 @pytest.mark.parametrize(("kind", "element", "material"), [
     ("quad", "jbar", AAA()), ("quad", "plain", NeoHookean(bulk_modulus=20.0)), ("quad", "planestress", AAA()),
-    ("quad", "jbar", HolzapfelGasserOgden()), ("hex", "jbar", AAA(bulk_modulus=50.0)), ("hex", "jbar", MooneyRivlin())])
+    ("quad", "jbar", HolzapfelGasserOgden()), ("hex", "jbar", AAA(bulk_modulus=50.0)), ("hex", "jbar", MooneyRivlin()),
+    ("quad", "axisymmetric", AAA(bulk_modulus=50.0)), ("quad", "axisymmetric", MooneyRivlin())])
 def test_configurational_forces_are_the_derivative_with_the_places_of_nodes(kind: str, element: str,
                                                                             material: Material) -> None:
     """Fails if the energy-momentum tensor is not that of the element, as without the term of J - J_bar."""
     space = box(kind, 4 if kind == "quad" else 2, 0.2)
+    if element == "axisymmetric":
+        space = Space(space.mesh.translated((0.5, 0.0)), axisymmetric=True)
     u, gamma = wavy(space, 0.15), patchy(space)
     forces = configurational_forces(momentum_of(space, material, gamma, element), u)
     rng, step = np.random.default_rng(3), 1e-6
@@ -238,6 +241,56 @@ def test_rate_is_the_sum_of_configurational_forces() -> None:
     q = np.clip(2 * (1 - np.linalg.norm(cracked.body.space.X - cracked.tip, axis=1) / 0.4), 0, 1)
     rate = energy_release_rate(*cracked[:2], cracked.tip, AHEAD, 0.4)
     np.testing.assert_allclose(rate.vector, -q @ forces, rtol=1e-10, atol=1e-12)
+
+
+# --- bodies of revolution ---
+def penny(h: float, *, ring: bool = False) -> Cracked:
+    """Half of a cylinder of radius and height 8 mm with a penny-shaped crack of radius 1 mm, strained by 1e-3.
+
+    Elements are h large at the crack. A `ring` is that crack from outside, up to the radius of 1 mm.
+    """
+    fine = np.arange(round(2 / h) + 1) * h
+    steps = [h * 1.1]
+    while sum(steps) < 6.0:
+        steps.append(steps[-1] * 1.1)
+    line = np.append(fine, 2.0 + np.cumsum(steps) * 6.0 / sum(steps))
+    space = Space(skfem.MeshQuad.init_tensor(line, line), axisymmetric=True)
+    r, y = space.X.T
+    middle = (y < 1e-9) & ((r < 1 + 1e-9) if ring else (r > 1 - 1e-9))
+    held = [(np.flatnonzero(middle), Grip("middle", (None, 0.0))), (rows(space, 1, True), Grip("top", (None, 8e-3)))]
+    return loaded(space, NeoHookean(bulk_modulus=2.0), held, (1.0, 0.0), element="axisymmetric", steps=1)
+
+
+def test_penny_shaped_crack() -> None:
+    """Fails if G is not that of Sneddon, 4 (1 - nu^2) s^2 a/(pi E), or depends on the domain; half of it is in a half.
+
+    Seen to fail by 18 to 50 % without the part of S around the axis. The cylinder has (a/b = 1/8) 0.2 % more; the error
+    of the mesh is of first order in h, 1.1 % for 1/32.
+    """
+    material, ratios = NeoHookean(bulk_modulus=2.0), []
+    k, mu = material.bulk_modulus, material.shear_modulus
+    young, nu = 9 * k * mu / (3 * k + mu), (3 * k - 2 * mu) / (2 * (3 * k + mu))
+    for h in (1 / 16, 1 / 32):
+        cracked = penny(h)
+        body, state = cracked.body, cracked.state
+        stress = float(body.momentum.force(state.u)[rows(body.space, 1, True), 1].sum()) / (np.pi * 64)
+        found = [2 * energy_release_rate(body, state, cracked.tip, AHEAD, radius).G for radius in (0.4, 0.6, 0.8)]
+        assert np.ptp(found) < 1e-4 * found[0]
+        ratios.append(found[1] / (4 * (1 - nu**2) * stress**2 / (np.pi * young)))
+    assert 2 * ratios[1] - ratios[0] == pytest.approx(1.0023, abs=2e-3)
+    assert abs(ratios[1] - 1.0023) < 0.013
+    with pytest.raises(ParameterError, match="reaches the axis of revolution: give a smaller radius"):
+        energy_release_rate(body, state, cracked.tip, AHEAD, 1.1)
+
+
+def test_rate_of_a_ring_is_what_its_energies_say() -> None:
+    """Fails if the length of the front is not that of the tip, or an advance towards the axis is another one."""
+    cracked, inwards = penny(1 / 16, ring=True), np.array([-1.0, 0.0])
+    rate = energy_release_rate(*cracked[:2], cracked.tip, inwards, 0.5)
+    forces = configurational_forces(cracked.body.momentum, cracked.state.u)
+    q = np.clip(2 * (1 - np.linalg.norm(cracked.body.space.X - cracked.tip, axis=1) / 0.5), 0, 1)
+    np.testing.assert_allclose(rate.vector * 2 * np.pi, -q @ forces, rtol=1e-9, atol=1e-12 * rate.G)
+    assert rate.thickness == pytest.approx(2 * np.pi) and rate.G > 0.0 and rate.strain < 0.02
 
 
 # --- bodies in space, halves, refusals ---

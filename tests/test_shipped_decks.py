@@ -16,7 +16,7 @@ from plates import invoke_program, plate
 
 import skfsink.run.compute
 from skfsink.errors import ParameterError
-from skfsink.material import SinkLaw
+from skfsink.material import AAA, SinkLaw
 from skfsink.meshing.sample import file_sample
 from skfsink.meshing.vtu import write_mesh
 from skfsink.results.result import Result
@@ -27,7 +27,7 @@ from skfsink.sweep.one import run_folder
 from skfsink.system import shipped
 from skfsink.system.shipped import data_folder, deck_name, deck_path, description, shipped_decks
 
-DECKS = ("aneurysm", "biaxial_hole", "centre_crack", "pure_shear")
+DECKS = ("aneurysm", "biaxial_hole", "centre_crack", "penny_crack", "pure_shear")
 
 
 def beside(name: str, script: str) -> ModuleType:
@@ -254,3 +254,25 @@ def test_the_section_of_the_aneurysm_opens_at_its_flaw(tmp_path: Path) -> None:
     middle = result.scene.space.X[result.scene.space.conn].mean(axis=1)[result.state.deleted]
     assert (middle[:, 1] > 1.0).all() and (np.abs(middle[:, 0]) < 0.2).all()
     assert result.summary["energy"]["balance_error_relative"] < 1e-6
+
+
+# --- the penny-shaped crack ---
+def test_energy_release_rate_of_the_penny_shaped_crack() -> None:
+    """Fails if the energies of two cracks do not give the G of linear elasticity, with an error of first order in h."""
+    exact, ratios = beside("penny_crack", "closed_form"), []
+    for mesh in ("coarse", "fine"):
+        G, a, load = exact.released(mesh, 4e-3)
+        ratios.append(G / exact.exact(load / (np.pi * exact.RADIUS**2), a, AAA()))
+    assert 1.0 < ratios[1] < ratios[0] < 1.1
+    assert 2 * ratios[1] - ratios[0] == pytest.approx(1.0, abs=0.015)
+
+
+def test_the_penny_shaped_crack_runs_to_the_side(tmp_path: Path) -> None:
+    """Fails if the cylinder does not begin to fail at its crack and come apart in the middle, as a whole body."""
+    result = read_deck(shipped_decks()["penny_crack"]).run(out=tmp_path / "run", quiet=True)
+    summary, pieces = result.summary, result.summary["fragments"]["pieces"]
+    assert summary["onset"]["boundary"] == "penny" and summary["event"]["separated"]
+    assert summary["energy"]["balance_error_relative"] < 1e-6
+    assert sum(piece["volume_mm3"] for piece in pieces) == pytest.approx(np.pi * 2**2 * 4, rel=0.06)
+    assert pieces[0]["momentum_y_N_s"] == pytest.approx(-pieces[1]["momentum_y_N_s"], rel=1e-3)
+    assert not result.state.u[result.scene.space.on_axis, 0].any()

@@ -12,12 +12,13 @@ from skfsink.fields.momentum import Momentum
 from skfsink.material import AAA
 
 
-@pytest.mark.parametrize("element", ["jbar", "plain", "planestress"])
+@pytest.mark.parametrize("element", ["jbar", "plain", "planestress", "axisymmetric"])
 def test_stress_at_the_points_gives_the_nodal_forces(space: Space, kind: str, element: str) -> None:
     """sum w J sigma F^-T Grad N is the force of the loops; fails if the two read gamma, J_bar or a dead point
     differently."""
-    if kind == "hex" and element == "planestress":
+    if kind == "hex" and element in ("planestress", "axisymmetric"):
         pytest.skip("for quadrilaterals only")
+    space = space.revolved() if element == "axisymmetric" else space
     momentum, u = Momentum(space, AAA(), element), wavy(space, 0.15)
     nodal = np.random.default_rng(3).uniform(0.05, 1, space.n_nodes)
     nodal[: space.n_nodes // 3] = 1e-9  # some points, and all points of some elements, exert no force
@@ -33,18 +34,21 @@ def test_stress_at_the_points_gives_the_nodal_forces(space: Space, kind: str, el
     d = space.dim
     force = np.zeros_like(space.X)
     np.add.at(force, space.conn, np.einsum("eq,eqiJ,eqaJ->eai", space.w, P[..., :d, :d], space.dN))
+    if space.axisymmetric:
+        np.add.at(force[:, 0], space.conn, np.einsum("eq,eq,eqa->ea", space.w, P[..., 2, 2], space.around))
     expected = momentum.force(u)
     np.testing.assert_allclose(force, expected, atol=1e-10 * np.abs(expected).max())
     if momentum.plane_stress:
         assert np.abs(s[..., 2]).max() < 1e-9 * np.abs(s).max()
 
 
-@pytest.mark.parametrize("element", ["jbar", "plain", "planestress"])
+@pytest.mark.parametrize("element", ["jbar", "plain", "planestress", "axisymmetric"])
 def test_the_stress_of_crushed_elements_is_unknown(kind: str, element: str) -> None:
     """Fails if a crushed point that bears a force is given a stress, as of F = I, or a dead one makes it unknown."""
-    if kind == "hex" and element == "planestress":
+    if kind == "hex" and element in ("planestress", "axisymmetric"):
         pytest.skip("for quadrilaterals only")
     space = box(kind, 3)
+    space = space.revolved() if element == "axisymmetric" else space
     momentum, x = Momentum(space, AAA(), element), space.X.copy()
     gamma = np.ones(space.n_nodes)
     gamma[space.conn[0]] = 0.0

@@ -29,6 +29,7 @@ from . import kernels
 from .backend import BulkViscosity, Part
 from .elements import ELEMENTS
 from .forms import MomentumForms, ViscousForms, density_forms, row_sums, viscous_forms
+from .forms.kinematics import kinematics
 from .pattern import Pattern
 from .space import Space
 
@@ -51,7 +52,7 @@ class _Assembly:
 
     def __init__(self, space: Space, basis: CellBasis, elements: np.ndarray | None) -> None:
         self.elements = slice(None) if elements is None else elements
-        self.basis = basis if elements is None else basis.with_elements(elements)
+        self.basis = basis if elements is None else space.measured(basis.with_elements(elements))
         self.dofs = np.ascontiguousarray(self.basis.element_dofs.T)
         block = basis.element_dofs.shape[0] // space.conn.shape[1]
         first = (space.conn[self.elements][0][:, None] * block + np.arange(block)).ravel()
@@ -108,6 +109,8 @@ class AssembledMomentum:
         assembly, fibres = self._assemblies[number], self._parts[number].fibres
         fields = {"displacement": assembly.basis.interpolate(u.ravel()), "gamma": gamma[assembly.elements],
                   "dV": assembly.basis.dx}
+        if self._space.axisymmetric:
+            fields["radius"] = np.asarray(assembly.basis.global_coordinates())[0]
         if fibres is not None:
             fields["fibres"] = np.repeat(fibres[:, None], gamma.shape[1], axis=1)
         return fields
@@ -138,8 +141,7 @@ class AssembledMomentum:
             total += np.bincount(assembly.dofs.ravel(), vectors.ravel(), u.size)
             self._force[assembly.elements] = vectors
             self.W[assembly.elements] = forms.energy.form(_extra(fields))
-            F = np.moveaxis(fields["displacement"].grad, (0, 1), (-2, -1)) + np.eye(self._space.dim)
-            least = min(least, float(np.linalg.det(F).min(where=fields["gamma"] > 0.0, initial=1.0)))
+            least = min(least, float(kinematics(_extra(fields)).J.min(where=fields["gamma"] > 0.0, initial=1.0)))
         out[...] = total.reshape(u.shape)
         return least
 
@@ -254,10 +256,11 @@ class AssembledDensity:
         sense = np.sign(gauss.mapping.detDF(gauss.X))
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # of rules that are left out
             for ends in range(2**self._space.dim):
-                basis = skfem.Basis(self._space.mesh, gauss.elem, quadrature=self._space.rule(ends))
+                basis = self._space.measured(skfem.Basis(self._space.mesh, gauss.elem,
+                                                         quadrature=self._space.rule(ends)))
                 matrices.append(self._assembly.matrices(self._forms.flux, basis))
                 jacobian = (sense * basis.mapping.detDF(basis.X)).min(axis=1)
-                usable.append(jacobian > kernels.LEAST_JACOBIAN * self._space.V)
+                usable.append(jacobian > kernels.LEAST_JACOBIAN * self._space.extent)
         return kernels.monotone(np.stack(matrices, axis=1), np.stack(usable, axis=1))
 
     def sink(self, pattern: Pattern, sink: np.ndarray) -> np.ndarray:

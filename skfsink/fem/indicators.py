@@ -90,7 +90,7 @@ def corner_near(space: Space, element: int) -> Corner | None:
     beside = np.isin(members, nodes[worst]).sum(axis=1) == nodes.shape[1]
     far = [space.X[np.setdiff1d(facet, nodes[worst])].mean(axis=0) for facet in members[beside]]
     lengths = np.linalg.norm(np.array(far) - place, axis=1)
-    thickness = space.V[space.mesh.f2t[0, facets[beside]]] / (lengths * breadth)
+    thickness = space.extent[space.mesh.f2t[0, facets[beside]]] / (lengths * breadth)
     return Corner(float(angles[worst]), place, float(lengths.mean() / np.radians(angles[worst])),
                   float(thickness.mean()))
 
@@ -108,24 +108,31 @@ def widths(space: Space) -> np.ndarray:
     ends = [(a, a + 2**i) for i in range(dim) for a in range(na) if not a >> i & 1]
     edges = np.stack([np.linalg.norm(x[:, b] - x[:, a], axis=1) for a, b in ends], axis=1)
     along = edges.reshape(len(x), dim, -1).max(axis=2)  # longest of each reference direction
-    width: np.ndarray = space.V / np.sort(along, axis=1)[:, 1:].prod(axis=1)
+    width: np.ndarray = space.extent / np.sort(along, axis=1)[:, 1:].prod(axis=1)
     return width
 
 
 def inverted(space: Space, u: np.ndarray, gamma: np.ndarray) -> tuple[int, float]:
     """Gauss points with gamma > 0 and J <= 0 at the displacement `u`: their number, and the greatest gamma there.
 
-    `gamma` (ne, nq) is the density that the force sees.
+    `gamma` (ne, nq) is the density that the force sees. Points beyond the axis of revolution count.
     """
-    F = np.eye(space.dim) + space.gradient(u)
-    inside_out = (np.linalg.det(F) <= 0.0) & (gamma > 0.0)
+    plane, around = _ratios(space, u)
+    inside_out = ((plane <= 0.0) | (around <= 0.0)) & (gamma > 0.0)
     return int(inside_out.sum()), float(gamma[inside_out].max(initial=0.0))
 
 
 def element_pressure(space: Space, u: np.ndarray, bulk_modulus: float) -> np.ndarray:
     """k (J_bar - 1) of the elements at the displacement `u` [MPa], (ne,)."""
-    F = np.eye(space.dim) + space.gradient(u)
-    return bulk_modulus * (space.element_mean(np.linalg.det(F)) - 1.0)
+    plane, around = _ratios(space, u)
+    return bulk_modulus * (space.element_mean(plane * around) - 1.0)
+
+
+def _ratios(space: Space, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """det F in the space of the mesh, and r/R of a body of revolution, 1 of others; at the Gauss points (ne, nq)."""
+    plane, F = np.linalg.det(np.eye(space.dim) + space.gradient(u)), np.ones((*space.w.shape, 3, 3))
+    space.add_hoop(F, u)
+    return plane, F[..., 2, 2]
 
 
 def alternation(space: Space, pressure: np.ndarray, part: np.ndarray | slice = slice(None)) -> float:

@@ -1,4 +1,4 @@
-"""Finite element spaces on four-node quadrilaterals (plane strain) and eight-node hexahedra.
+"""Finite element spaces on four-node quadrilaterals, plane or of a body of revolution, and eight-node hexahedra.
 
 One :class:`Space` holds what both fields share and never changes in a run: the scikit-fem bases (displacement Q1,
 density Q1, element constants), the 2x2(x2) Gauss points, the shape functions and their gradients there, and the
@@ -7,25 +7,29 @@ the fixed sparsity of the matrices.
 
 Nodes of an element and its Gauss points are numbered lexicographically, the first reference coordinate running
 fastest: node (i, j[, k]) of the unit square or cube has the number i + 2j [+ 4k], and Gauss point q is the one
-nearest to node q. Shapes: n nodes, `ne` elements, `na` = 4 or 8 nodes and as many Gauss points `nq` in an element,
-`dim` = 2 or 3. Displacement component i of node a is degree of freedom dim*a + i, as in scikit-fem.
+nearest to node q. A body of revolution about the y axis is meshed in its half plane x = R >= 0; its quadrature weights
+are 2 pi R dA, so that all integrals are those of the whole body. Shapes: n nodes, `ne` elements, `na` = 4 or 8 nodes
+and as many Gauss points `nq` in an element, `dim` = 2 or 3. Displacement component i of node a is degree of freedom
+dim*a + i, as in scikit-fem.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import skfem
 from scipy.sparse import coo_array, csr_array
 
-from ..errors import MeshError
+from ..errors import MeshError, place_text
 from ..system.jit import njit
 from .quadrature import AXES, points, shape_functions
 
 __all__ = ["Space", "node_key"]
 
+ON_AXIS = 1e-9  # of the size of a body of revolution: x up to which a node is on its axis
 _ELEMENTS = {"quad": skfem.ElementQuad1, "hex": skfem.ElementHex1}
 
 
@@ -36,19 +40,23 @@ class Space:
     Parameters
     ----------
     mesh: scikit-fem `MeshQuad` or `MeshHex`, coordinates in mm.
+    axisymmetric: whether the quadrilaterals are the half plane x >= 0 of a body of revolution about the y axis.
 
     Raises
     ------
     MeshError
-        The mesh has other elements, unused nodes, or an element whose Jacobian is not positive at a Gauss point.
+        The mesh has other elements, unused nodes, or an element whose Jacobian is not positive at a Gauss point; or
+        that of a body of revolution is one of hexahedra, or has a node at x < 0.
     """
 
     mesh: skfem.Mesh
+    axisymmetric: bool = False
     X: np.ndarray = field(init=False)      #: nodal coordinates [mm], (n, dim)
     conn: np.ndarray = field(init=False)   #: nodes of the elements, lexicographic, (ne, na)
     N: np.ndarray = field(init=False)      #: shape functions at the Gauss points, (nq, na)
     dN: np.ndarray = field(init=False)     #: their gradients Grad N [1/mm], (ne, nq, na, dim)
-    w: np.ndarray = field(init=False)      #: quadrature weights times Jacobian [mm^dim], (ne, nq)
+    w: np.ndarray = field(init=False)      #: quadrature weights of the body [mm^volume_dim], (ne, nq)
+    dX: np.ndarray = field(init=False)     #: those of the mesh, which are the same but for 2 pi R [mm^dim], (ne, nq)
     invJ: np.ndarray = field(init=False)   #: d xi/d X [1/mm], (ne, nq, dim, dim)
 
     def __post_init__(self) -> None:
@@ -83,16 +91,49 @@ class Space:
             raise MeshError(f"element {e} is inverted or degenerate: its Jacobian is {detJ[e].min():.3g} at a Gauss "
                             f"point, and must be positive")
         invJ = np.linalg.inv(J)
-        for name_, value in (("X", X), ("conn", conn), ("N", N), ("w", detJ / 2**dim), ("invJ", invJ),
-                             ("dN", np.einsum("qak,eqkJ->eqaJ", dN_ref, invJ))):
+        dX = detJ / 2**dim
+        for name_, value in (("X", X), ("conn", conn), ("N", N), ("dX", dX), ("w", dX * self._round(X, conn, N)),
+                             ("invJ", invJ), ("dN", np.einsum("qak,eqkJ->eqaJ", dN_ref, invJ))):
             value = np.ascontiguousarray(value)
             value.setflags(write=False)
             object.__setattr__(self, name_, value)
 
+    def _round(self, X: np.ndarray, conn: np.ndarray, N: np.ndarray) -> np.ndarray | float:
+        """Way around the axis at the Gauss points, 2 pi R [mm], (ne, nq); 1 of other bodies."""
+        if not self.axisymmetric:
+            return 1.0
+        if X.shape[1] == 3:
+            raise MeshError("a body of revolution is meshed by quadrilaterals in its half plane x >= 0; this mesh has "
+                            "hexahedra: take element jbar")
+        least = int(np.argmin(X[:, 0]))
+        if X[least, 0] < -ON_AXIS * float(np.ptp(X, axis=0).max()):
+            raise MeshError(f"a body of revolution about the y axis has its mesh at x >= 0; the node at "
+                            f"{place_text(X[least])} mm is beyond the axis: move the mesh by {-X[least, 0]:.3g} mm "
+                            f"along x, or keep its half")
+        return 2.0 * np.pi * (X[conn, 0] @ N.T)
+
+    @cached_property
+    def on_axis(self) -> np.ndarray:
+        """Mask of the nodes on the axis of revolution, (n,); there is none in other bodies."""
+        if not self.axisymmetric:
+            return np.zeros(self.n_nodes, bool)
+        near: np.ndarray = self.X[:, 0] <= ON_AXIS * float(np.ptp(self.X, axis=0).max())
+        return near
+
+    def revolved(self) -> Space:
+        """The same mesh as the half plane of a body of revolution."""
+        return Space(self.mesh, axisymmetric=True)
+
     @property
     def dim(self) -> int:
-        """Dimension of the mesh, 2 (plane strain) or 3."""
+        """Dimension of the mesh, 2 or 3."""
         return int(self.X.shape[1])
+
+    @property
+    def volume_dim(self) -> int:
+        """Dimension of the body: 3 of one of revolution too; 2 of a plane one, whose figures are per mm of thickness.
+        """
+        return 3 if self.axisymmetric else self.dim
 
     @property
     def n_nodes(self) -> int:
@@ -106,8 +147,18 @@ class Space:
 
     @cached_property
     def V(self) -> np.ndarray:
-        """Referential volume (area in 2D) of the elements [mm^dim], (ne,)."""
+        """Referential volume (area in the plane) of the elements [mm^volume_dim], (ne,)."""
         return self.w.sum(axis=1)
+
+    @cached_property
+    def extent(self) -> np.ndarray:
+        """Volume or area of the elements in the mesh [mm^dim], (ne,): V, but of rings their section."""
+        return self.dX.sum(axis=1)
+
+    @cached_property
+    def around(self) -> np.ndarray:
+        """N_a/R at the Gauss points of a body of revolution [1/mm], (ne, nq, na): they give u_r/R, the hoop strain."""
+        return self.N / (self.X[self.conn, 0] @ self.N.T)[:, :, None]
 
     @cached_property
     def element_dofs(self) -> np.ndarray:
@@ -116,8 +167,8 @@ class Space:
 
     @cached_property
     def h(self) -> np.ndarray:
-        """Size of the elements, V^(1/dim) [mm], (ne,)."""
-        return self.V ** (1 / self.dim)
+        """Size of the elements in the mesh, its extent^(1/dim) [mm], (ne,)."""
+        return self.extent ** (1 / self.dim)
 
     # --- scikit-fem bases, on the same Gauss points in the same order ---
     def rule(self, ends: int = 0) -> tuple[np.ndarray, np.ndarray]:
@@ -127,12 +178,18 @@ class Space:
     @cached_property
     def gamma_basis(self) -> skfem.Basis:
         """Q1 basis of the relative density."""
-        return skfem.Basis(self.mesh, self._elements(_ELEMENTS), quadrature=self.rule())
+        return self.measured(skfem.Basis(self.mesh, self._elements(_ELEMENTS), quadrature=self.rule()))
 
     @cached_property
     def u_basis(self) -> skfem.Basis:
         """Q1 vector basis of the displacement."""
-        return self.gamma_basis.with_element(skfem.ElementVector(self._elements(_ELEMENTS)))
+        return self.measured(self.gamma_basis.with_element(skfem.ElementVector(self._elements(_ELEMENTS))))
+
+    def measured(self, basis: Any) -> Any:
+        """A new basis on elements or facets of the mesh, made to integrate over the body: 2 pi R dA of revolution."""
+        if self.axisymmetric:
+            basis.dx = 2.0 * np.pi * np.asarray(basis.global_coordinates())[0] * basis.dx
+        return basis
 
     def _elements(self, table: dict[str, type]) -> skfem.Element:
         return table["quad" if self.dim == 2 else "hex"]()
@@ -149,19 +206,31 @@ class Space:
         return np.einsum("ea...,eqaJ->eq...J", nodal[self.conn], self.dN)
 
     def deformation_gradient(self, u: np.ndarray) -> np.ndarray:
-        """F = I + Grad u at the Gauss points, (ne, nq, 3, 3); plane strain in 2D (F_33 = 1)."""
+        """F = I + Grad u at the Gauss points, (ne, nq, 3, 3); in 2D F_33 = 1, or r/R of a body of revolution."""
         F = np.zeros((self.n_elements, self.w.shape[1], 3, 3))
         F[...] = np.eye(3)
         F[..., :self.dim, :self.dim] += self.gradient(u)
+        self.add_hoop(F, u)
         return F
+
+    def add_hoop(self, F: np.ndarray, u: np.ndarray, elements: np.ndarray | slice = slice(None)) -> None:
+        """Add u_r/R at the Gauss points of `elements` (m,) to the F_33 of `F` (m, nq, 3, 3); nothing if none turns."""
+        if self.axisymmetric:
+            F[..., 2, 2] += np.einsum("ea,eqa->eq", u[self.conn[elements], 0], self.around[elements])
 
     def element_mean(self, values: np.ndarray) -> np.ndarray:
         """L2 projection (ne,) of Gauss point values (ne, nq) on the element constants (Eq. 13)."""
         return np.einsum("eq,eq->e", self.w, values) / self.V
 
     def mean_slopes(self) -> np.ndarray:
-        """Means over the elements of the gradients of the shape functions [1/mm], (ne, na, dim)."""
-        return np.einsum("eq,eqai->eai", self.w, self.dN) / self.V[:, None, None]
+        """Derivatives of the mean volume ratio of the undeformed elements with the displacements [1/mm], (ne, na, dim).
+
+        They are the means of the gradients of the shape functions, and of N_a/R in a body of revolution.
+        """
+        slopes = np.einsum("eq,eqai->eai", self.w, self.dN) / self.V[:, None, None]
+        if self.axisymmetric:
+            slopes[..., 0] += np.einsum("eq,eqa->ea", self.w, self.around) / self.V[:, None]
+        return slopes
 
     def lump(self, values: np.ndarray) -> np.ndarray:
         """Row sums of the mass matrix with weight `values` (ne, nq):  sum_q w_q values_q N_a(q), (n,)."""

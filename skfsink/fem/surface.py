@@ -53,7 +53,7 @@ class Surface:
 
     # --- means ---
     def places(self) -> tuple[Places, np.ndarray]:
-        """Points of integration on the facets, and their parts of the undeformed surface [mm^(dim-1)], (m,)."""
+        """Points of integration on the facets, and their parts of the undeformed surface [mm^(volume_dim-1)], (m,)."""
         space, dim = self.space, self.space.dim
         flat = points(dim - 1) if dim == 3 else np.array([[0.5 - 0.5 / np.sqrt(3)], [0.5 + 0.5 / np.sqrt(3)]])
         elements, shape, weights = [], [], []
@@ -63,6 +63,8 @@ class Surface:
             of = self.elements[self._sides == side]
             arms = np.einsum("eai,qak->eqik", space.X[space.conn[of]], np.delete(dN, axis, axis=2))
             area = np.sqrt(np.linalg.det(np.swapaxes(arms, -1, -2) @ arms)) / len(flat)
+            if space.axisymmetric:
+                area = area * 2.0 * np.pi * (space.X[space.conn[of], 0] @ N.T)
             elements.append(np.repeat(of, len(flat)))
             shape.append(np.tile(N, (of.size, 1)))
             weights.append(area.ravel())
@@ -97,7 +99,9 @@ class Surface:
         return found
 
     def check_caps(self) -> None:
-        """Refuse a rim that no flat cap closes (ParameterError)."""
+        """Refuse a rim that no flat cap closes (ParameterError); disks close all rings of a body of revolution."""
+        if self.space.axisymmetric:
+            return
         rims, X = self.rims(), self.space.X
         cure = "give the position of a point to which straight lines from the rim close it"
         if self.space.dim == 2 and len(rims) > 1:
@@ -117,8 +121,11 @@ class Surface:
 
         n points out of the body: the volume that a cavity encloses is the negative of it. Without an `apex` open rims
         are closed by flat caps, in space by a fan of triangles to the mean of the rim's nodes; with an `apex` (dim,) by
-        straight lines to it, which add nothing.
+        straight lines to it, which add nothing. Of a body of revolution disks normal to the axis are the caps, and the
+        apex is on the axis (ParameterError).
         """
+        if self.space.axisymmetric:
+            return self._round_volume(x, apex)
         centre = x[self.facets[0, 0]] if apex is None else apex
         total = _flux(x[self.facets] - centre)
         if apex is None:
@@ -133,12 +140,24 @@ class Surface:
         return total
 
 
-def _flux(corners: np.ndarray) -> float:
+    def _round_volume(self, x: np.ndarray, apex: np.ndarray | None) -> float:
+        """pi int r^2 dz within the rings; with an apex that of the cones to it is left out."""
+        if apex is not None:
+            if apex[0] != 0.0:
+                raise ParameterError(f"the point that closes the boundary {self.name!r} of a body of revolution must "
+                                     f"be on its axis, x = 0; got {place_text(apex)} mm")
+            return _flux(x[self.facets] - apex, revolved=True)
+        (r, z), (s, y) = np.moveaxis(x[self.facets], 0, -1)
+        return float(np.pi / 3 * ((r * r + r * s + s * s) * (y - z)).sum())
+
+
+def _flux(corners: np.ndarray, revolved: bool = False) -> float:
     """(1/dim) int x . n dA over facets with corners (nf, 2 or 4, dim), those in space bilinear; it is exact.
 
     It is the volume that they sweep on their way from the origin.
     """
     of = corners if corners.shape[1] == 2 else corners[:, _QUAD]
     x, out = of.reshape(-1, of.shape[2]), np.empty(len(of))
-    swept_volumes(np.arange(len(x)).reshape(of.shape[:2]), np.zeros_like(x), x, np.ones((2, len(of))), out)
+    swept_volumes(np.arange(len(x)).reshape(of.shape[:2]), np.zeros_like(x), x, np.ones((2, len(of))), out,
+                  revolved)
     return -float(out.sum())

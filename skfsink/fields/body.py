@@ -180,7 +180,7 @@ class Body:
     @property
     def least_energy(self) -> float:
         """Energy [N mm; N mm/mm in 2D] below which rounding is seen: 1e-6 of what a crack takes as it runs by l."""
-        return 1e-6 * self.density.law.phi * self.density.law.length_scale ** self.space.dim
+        return 1e-6 * self.density.law.phi * self.density.law.length_scale ** self.space.volume_dim
 
     @cached_property
     def wave_speed_at_failure(self) -> float:

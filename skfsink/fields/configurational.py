@@ -9,6 +9,11 @@ nodes: with H = Grad u, and of weights, gradients, mean J and mean gamma of an e
 
 with p = gamma_bar k (J_bar - 1).
 
+In a body of revolution dw has the part  w N_a/R dX_aR  besides, and  dF_33 = -(u_r/R) N_a/R dX_aR,  so that
+dPi/dX_aR gets
+
+    sum_q w S_33 N_a/R,   S_33 = gamma W + p (J - J_bar) - (u_r/R) P_33.
+
 S is the energy-momentum tensor (Eshelby, J. Elasticity 5 (1975) 321-335), with the stress P of the element. The term of
 J - J_bar comes with the element constant J_bar; it vanishes with the size of the elements, and there is none in the
 elements "plain" and "planestress".
@@ -36,12 +41,15 @@ class PointStress(NamedTuple):
     ----------
     energy: gamma W [MPa], (m, nq).   excess: p (J - J_bar) [MPa], (m, nq).
     P: first Piola-Kirchhoff stress of the body's dimension [MPa], (m, nq, dim, dim).   H: Grad u, of the same shape.
+    around: S_33 [MPa], (m, nq), and strain: u_r/R, of the same shape, of a body of revolution; 0 of others.
     """
 
     energy: np.ndarray
     excess: np.ndarray
     P: np.ndarray
     H: np.ndarray
+    around: np.ndarray
+    strain: np.ndarray
 
     @property
     def tensor(self) -> np.ndarray:
@@ -62,8 +70,10 @@ def configurational_forces(momentum: Momentum, u: np.ndarray) -> np.ndarray:
     """
     space = momentum.space
     elements = np.arange(space.n_elements)
-    S = point_stress(momentum, u, elements, momentum.gamma).tensor
-    local = np.einsum("eq,eqKJ,eqaJ->eaK", space.w, S, space.dN)
+    stress = point_stress(momentum, u, elements, momentum.gamma)
+    local = np.einsum("eq,eqKJ,eqaJ->eaK", space.w, stress.tensor, space.dN)
+    if space.axisymmetric:
+        local[..., 0] += np.einsum("eq,eq,eqa->ea", space.w, stress.around, space.around)
     out = np.zeros_like(space.X)
     for i in range(space.dim):
         out[:, i] = np.bincount(space.conn.ravel(), local[..., i].ravel(), space.n_nodes)
@@ -74,13 +84,18 @@ def point_stress(momentum: Momentum, u: np.ndarray, elements: np.ndarray, gamma:
     """Energy and stress of `elements` (m,) at the displacement `u` (n, dim), for the density `gamma` (m, nq)."""
     space, dim = momentum.space, momentum.space.dim
     H = np.swapaxes(u[space.conn[elements]], 1, 2)[:, None] @ space.dN[elements]
-    found = PointStress(np.zeros_like(gamma), np.zeros_like(gamma), np.zeros_like(H), H)
+    found = PointStress(np.zeros_like(gamma), np.zeros_like(gamma), np.zeros_like(H), H, np.zeros_like(gamma),
+                        np.zeros_like(gamma))
     for part, rows, own in among(momentum.parts, elements):
         F = np.zeros((len(rows), gamma.shape[1], 3, 3))
         F[...] = np.eye(3)
         F[..., :dim, :dim] += H[rows]
+        space.add_hoop(F, u, elements[rows])
         W, P, excess = _of_part(momentum, part, own, F, gamma[rows])
         found.energy[rows], found.excess[rows], found.P[rows] = gamma[rows] * W, excess, P[..., :dim, :dim]
+        if space.axisymmetric:
+            found.strain[rows] = F[..., 2, 2] - 1.0
+            found.around[rows] = gamma[rows] * W + excess - (F[..., 2, 2] - 1.0) * P[..., 2, 2]
     return found
 
 
@@ -93,7 +108,7 @@ def _of_part(momentum: Momentum, part: Part, own: np.ndarray, F: np.ndarray,
     cof = cofactor(F)
     J = np.einsum("...J,...J", F[..., 0, :], cof[..., 0, :])
     k, J_bar, gamma_bar = material.bulk_modulus, J, gamma
-    if momentum.element == "jbar":
+    if momentum.j_bar:
         J_bar, gamma_bar = ((w * a).sum(axis=1, keepdims=True) / w.sum(axis=1, keepdims=True) for a in (J, gamma))
     p = gamma_bar * k * (J_bar - 1)
     F = np.where((gamma > 0)[..., None, None], F, np.eye(3))  # a dead point may have any shape

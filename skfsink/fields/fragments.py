@@ -18,8 +18,8 @@ SPENT = 1e-2        # nodes with a lower gamma carry nothing, and their displace
 class Fragments(NamedTuple):
     """Pieces that bear force.
 
-    `pieces`: their number.   `debris`: of those, the ones smaller than a square (cube) of side l.   `debris_share`: the
-    part of the undeformed body that is debris.
+    `pieces`: their number.   `debris`: of those, the ones smaller than a square (cube) of side l; of rings their
+    section.   `debris_share`: the part of the undeformed body that is debris.
     """
 
     pieces: int
@@ -46,7 +46,7 @@ def fragments(space: Space, gamma: np.ndarray, deleted: np.ndarray, length_scale
     if not alive.size:
         return Fragments(0, 0, 0.0)
     volume = np.bincount(piece, space.V[alive])
-    small = volume[volume < length_scale**space.dim]
+    small = volume[np.bincount(piece, space.extent[alive]) < length_scale**space.dim]
     return Fragments(volume.size, small.size, float(small.sum() / space.V.sum()))
 
 
@@ -55,7 +55,7 @@ def debris(space: Space, gamma: np.ndarray, deleted: np.ndarray, held: np.ndarra
     alive, piece = pieces_at(space, gamma, deleted, SPENT)
     if not alive.size:
         return alive
-    small = np.bincount(piece, space.V[alive]) < length_scale**space.dim
+    small = np.bincount(piece, space.extent[alive]) < length_scale**space.dim
     small[piece[held[space.conn[alive]].any(axis=1)]] = False
     return alive[small[piece]]
 

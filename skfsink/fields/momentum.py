@@ -37,7 +37,8 @@ class Momentum:
     ----------
     space, material: the spaces and the stored energy, of the elements that are in no region.
     element: "jbar" for the element-constant J_bar, "plain" for the standard element, "planestress" for a thin sheet of
-        quadrilaterals, whose forces, energies and masses are per mm of undeformed thickness as in plane strain.
+        quadrilaterals, whose forces, energies and masses are per mm of undeformed thickness as in plane strain;
+        "axisymmetric" for the J_bar of a body of revolution, as which `space` was made: figures are of all of it.
     force_floor: Gauss points with gamma below this exert no force. Their stiffness and mass are then gone together.
     threads: that share the loops over elements; results do not depend on their number.
     regions: elements of other materials.
@@ -66,7 +67,8 @@ class Momentum:
                  threads: int = 1, *, regions: Sequence[Region] = (), dead: NodalLoads | None = None,
                  followers: FollowerLoads | None = None, kernels: str = "compiled",
                  bulk_viscosity: BulkViscosity = BulkViscosity()) -> None:  # noqa: B008
-        self.plane_stress = check_element(element, space, kernels).thin_sheet
+        made = check_element(element, space, kernels)
+        self.plane_stress, self.j_bar = made.thin_sheet, made.j_bar
         self.space, self.material, self.element, self.force_floor = space, material, element, force_floor
         self.parts = self._divide(regions)
         materials = [part.material for part in self.parts]
@@ -105,6 +107,8 @@ class Momentum:
                     raise ParameterError("element planestress is for laws of I1' alone; "
                                          f"{type(material).__name__} has more invariants: take jbar")
                 fibres = material.fibres(space.X[space.conn[elements]].mean(axis=1))
+                if space.axisymmetric:
+                    _check_mirrored(fibres, type(material).__name__)
             parts.append(Part(material, elements if elements.size < space.n_elements else None, fibres))
         return parts
 
@@ -313,6 +317,14 @@ class Momentum:
         if isinstance(self.rho0, np.ndarray):
             return self.backend.lump(gamma * self.rho0)
         return self.backend.lump(gamma) * self.rho0
+
+
+def _check_mirrored(fibres: np.ndarray, material: str) -> None:
+    """Refuse directions (ne, families, 3) that would twist a body of revolution: their mirror images are not there."""
+    cosine = np.abs(np.einsum("efi,egi->efg", fibres * [1.0, 1.0, -1.0], fibres))
+    if fibres.shape[1] and not (cosine.max(axis=2) > 1.0 - 1e-9).all():
+        raise ParameterError(f"the fibres of {material} would twist a body of revolution: let those at plus and minus "
+                             f"the angle to r, y or the way around be alike (axis and normal along x, y or z)")
 
 
 def terms_without(momentum: Momentum, dynamic: bool) -> tuple[str, ...]:

@@ -18,19 +18,22 @@ __all__ = ["Pieces", "pieces_of"]
 class Pieces(NamedTuple):
     """The pieces that bear force, the heaviest first; in the plane all is per mm of thickness.
 
+    Those of a body of revolution are rings: their centre is on the axis, and they have momentum along it alone.
+
     Masses are gamma-weighted and lumped at the nodes, without any that `raised_mass` adds, each element's in its own
     piece: a sum over the pieces is that of the body, but for elements with gamma below 1e-2 at all their nodes, which
     are in no piece. Vectors of a plane body have 2 components, but angular momentum and spin 1, about z.
 
     Attributes
     ----------
-    elements: their number, (p,).   volume: undeformed [mm^dim], (p,).
+    elements: their number, (p,).   volume: undeformed [mm^volume_dim], (p,).
     mass: [t; t/mm in 2D], (p,).    centre: of mass, in the deformed body [mm], (p, dim).
     velocity: of the centre [mm/s], (p, dim).   momentum: [N s; N s/mm in 2D], (p, dim).
     kinetic: kinetic energy [N mm; N mm/mm in 2D], (p,).   translation, rotation: the parts of it that a rigid piece of
         that momentum and angular momentum would have; the rest is deformation.
     angular_momentum: about the centre [N mm s; N mm s/mm in 2D], (p, 3 or 1).
     spin: that angular momentum over the inertia of the piece as it lies [1/s], (p, 3 or 1).
+    extent: volume, or of rings their section, undeformed [mm^dim], (p,).
     """
 
     elements: np.ndarray
@@ -44,6 +47,7 @@ class Pieces(NamedTuple):
     rotation: np.ndarray
     angular_momentum: np.ndarray
     spin: np.ndarray
+    extent: np.ndarray
 
 
 def pieces_of(momentum: Momentum, state: State) -> Pieces:
@@ -73,6 +77,9 @@ def _motion(space: Space, alive: np.ndarray, piece: np.ndarray, mass: np.ndarray
 
     weight = np.where((total > 0.0)[piece, None], mass, (space.w[alive] @ space.N))  # of one without mass its volume
     x, v = (space.X + state.u)[nodes], state.v[nodes]
+    kinetic = 0.5 * sums(mass * (v**2).sum(axis=2))
+    if space.axisymmetric:
+        x, v = x * [0.0, 1.0], v * [0.0, 1.0]
     centre = sums(weight[..., None] * x) / sums(weight)[:, None]
     momentum = sums(mass[..., None] * v)
     velocity = momentum / np.where(total > 0.0, total, 1.0)[:, None]
@@ -87,5 +94,6 @@ def _motion(space: Space, alive: np.ndarray, piece: np.ndarray, mass: np.ndarray
         inertia = sums(mass[..., None, None] * outer)
         spin = np.einsum("pij,pj->pi", np.linalg.pinv(inertia, hermitian=True), angular)
     return Pieces(np.bincount(piece, minlength=number), sums(space.w[alive]), total, centre,
-                  velocity, momentum, 0.5 * sums(mass * (v**2).sum(axis=2)),
-                  0.5 * (momentum * velocity).sum(axis=1), 0.5 * (angular * spin).sum(axis=1), angular, spin)
+                  velocity, momentum, kinetic,
+                  0.5 * (momentum * velocity).sum(axis=1), 0.5 * (angular * spin).sum(axis=1), angular, spin,
+                  sums(space.dX[alive]))

@@ -73,6 +73,8 @@ def _stretches(momentum: Momentum, state: State, places: Places) -> np.ndarray:
     F = np.zeros((elements.size, 3, 3))
     F[:] = np.eye(3)
     F[:, :dim, :dim] += np.einsum("eq,eai,eqaJ->eiJ", w, state.u[space.conn[elements]], space.dN[elements])
+    if space.axisymmetric:
+        F[:, 2, 2] += np.einsum("eq,ea,eqa->e", w, state.u[space.conn[elements], 0], space.around[elements])
     upright = np.linalg.det(F) > 0.0
     F[~upright] = np.eye(3)
     if momentum.plane_stress:

@@ -52,7 +52,8 @@ class ReleaseRate:
     radius: of the domain [mm].
     static: G without its kinetic terms [N/mm].
     strain: greatest principal Green strain, in amount, where gamma > 0.5 and 0 < q < 1.
-    thickness: length of the front in the domain [mm]; 1 in 2D, where energies are per mm.
+    thickness: length of the front in the domain [mm]; 1 in 2D, where energies are per mm, and 2 pi R of the tip in a
+        body of revolution.
     """
 
     G: float
@@ -66,11 +67,15 @@ class ReleaseRate:
 
 
 class _Domain(NamedTuple):
-    """Elements of a domain, and the weight q at their nodes (m, na)."""
+    """Elements of a domain, and the weight q at their nodes (m, na).
+
+    `around` is w q/R at their Gauss points, (m, nq): an advance along r makes rings longer. It is 0 of other bodies.
+    """
 
     elements: np.ndarray
     q: np.ndarray
     thickness: float
+    around: np.ndarray
 
 
 def energy_release_rate(body: Body, state: State, tip: np.ndarray, direction: np.ndarray, radius: float, *,
@@ -112,9 +117,11 @@ def energy_release_rate(body: Body, state: State, tip: np.ndarray, direction: np
     dq = (domain.q[:, None, None] @ dN)[..., 0, :]
     dq *= w[..., None]
     static = -np.einsum("eqKJ,eqJ->K", stress.tensor, dq) / domain.thickness
+    static[0] -= float(np.einsum("eq,eq->", stress.around, domain.around)) / domain.thickness
     rho = gamma * (momentum.rho0[elements] if isinstance(momentum.rho0, np.ndarray) else momentum.rho0)
     kinetic, inertia = _inertia(space, state, domain, stress.H, rho)
     vector = static + (inertia - np.einsum("eq,eqK->K", kinetic, dq)) / domain.thickness
+    vector[0] -= float(np.einsum("eq,eq->", kinetic, domain.around)) / domain.thickness
     if not np.isfinite(vector).all():
         raise ParameterError(f"{at} has an energy release rate that is no number: the displacements there are none")
     G = float(vector @ direction)
@@ -193,7 +200,14 @@ def _domain(space: Space, tip: np.ndarray, front: np.ndarray | None, radius: flo
         raise ParameterError(f"the domain of {radius:.4g} mm around the tip at {place_text(tip)} mm has {int(whole)} "
                              f"elements within half of the radius, and needs 4: give a greater radius, or a tip in "
                              f"the body")
-    return _Domain(elements, at_nodes[elements], thickness)
+    around = np.zeros((elements.size, space.N.shape[0]))
+    if space.axisymmetric:
+        if (q[space.on_axis] > 0).any():
+            raise ParameterError(f"the domain of {radius:.4g} mm around the tip at {place_text(tip)} mm reaches the "
+                                 f"axis of revolution: give a smaller radius")
+        thickness = 2.0 * np.pi * float(tip[0])
+        around = space.w[elements] * np.einsum("ea,eqa->eq", at_nodes[elements], space.around[elements])
+    return _Domain(elements, at_nodes[elements], thickness, around)
 
 
 def _inertia(space: Space, state: State, domain: _Domain, H: np.ndarray,
@@ -223,8 +237,10 @@ def _strain(stress: PointStress, gamma: np.ndarray, domain: _Domain) -> float:
     E = 0.5 * (H + np.swapaxes(H, -1, -2) + np.swapaxes(H, -1, -2) @ H)
     if H.shape[-1] == 3:
         return float(np.abs(np.linalg.eigvalsh(E)).max())
+    around = stress.strain[rows][gamma[rows] > 0.5]
     middle = 0.5 * (E[..., 0, 0] + E[..., 1, 1])
-    return float((np.abs(middle) + np.hypot(0.5 * (E[..., 0, 0] - E[..., 1, 1]), E[..., 0, 1])).max())
+    in_plane = (np.abs(middle) + np.hypot(0.5 * (E[..., 0, 0] - E[..., 1, 1]), E[..., 0, 1])).max()
+    return float(max(in_plane, np.abs(around + 0.5 * around**2).max()))
 
 
 # --- what a domain must not have ---
@@ -267,6 +283,8 @@ def _check_surroundings(body: Body, state: State, domain: _Domain, density: np.n
         owner, corners = rows[owner], space.face_corners[face]
         faces, q = nodes[owner[:, None], corners], domain.q[owner[:, None], corners]
         lean = area_vectors(space.X[faces], space.X[nodes[owner]].mean(axis=1)) @ direction
+        if space.axisymmetric:
+            lean = lean * 2.0 * np.pi * space.X[faces, 0].mean(axis=1)
         inside = (q == 1).all(axis=1) & (lean <= 0) & free
         energy = density[owner] * np.abs(lean) * q.mean(axis=1) * ~inside
         return float(energy.sum()) / domain.thickness, faces[(q > 0).any(axis=1)]

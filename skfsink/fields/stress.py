@@ -52,6 +52,7 @@ def _at_points(momentum: Momentum, u: np.ndarray, part: Part, rows: slice | np.n
     F = np.zeros((*gamma.shape, 3, 3))
     F[...] = np.eye(3)
     F[..., :space.dim, :space.dim] += np.einsum("eai,eqaJ->eqiJ", u[space.conn[elements]], space.dN[elements])
+    space.add_hoop(F, u, elements)
     raw = _determinant(F)
     flat = raw < J_FLOOR
     F[flat] = np.eye(3)  # as good as any for points without stiffness; those with it are marked as unknown
@@ -59,7 +60,7 @@ def _at_points(momentum: Momentum, u: np.ndarray, part: Part, rows: slice | np.n
         F = material.thin_sheet(F[..., :2, :2])
     J_bar = J = _determinant(F)
     gamma_bar = gamma
-    if momentum.element == "jbar":
+    if momentum.j_bar:
         w = space.w[elements]
         J_bar, gamma_bar = ((w * a).sum(axis=1, keepdims=True) / w.sum(axis=1, keepdims=True) for a in (raw, gamma))
     if isinstance(material, GeneralMaterial) and part.fibres is not None:

@@ -31,7 +31,7 @@ class BodyForce(NodalLoads):
     Raises
     ------
     ParameterError
-        It has not as many components as the mesh.
+        It has not as many components as the mesh, or one along r of a body of revolution.
     """
 
     weighs = True
@@ -40,6 +40,9 @@ class BodyForce(NodalLoads):
                  elements: np.ndarray | None = None) -> None:
         if len(rate) != space.dim:
             raise ParameterError(f"a body force must have {space.dim} components, as the mesh; got {len(rate)}")
+        if space.axisymmetric and (isinstance(rate[0], Ramp) or rate[0] != 0.0):
+            raise ParameterError("a body force on a body of revolution acts along its axis: leave x out, which is the "
+                                 "radius")
         self.space, self._rates, self._time = space, rate, 0.0
         self.ramps = tuple(value for value in rate if isinstance(value, Ramp))
         self.elements = np.arange(space.n_elements) if elements is None else np.asarray(elements)

@@ -53,7 +53,7 @@ class DeadLoad(NodalLoads):
             if not facets.size:
                 raise MeshError(f"no traction can act on boundary {traction.boundary!r}: no facet of the surface has "
                                 f"all its nodes in it; name all nodes of a side")
-            basis = skfem.FacetBasis(space.mesh, space.gamma_basis.elem, facets=facets, intorder=2)
+            basis = space.measured(skfem.FacetBasis(space.mesh, space.gamma_basis.elem, facets=facets, intorder=2))
             elements.append(basis.tind)
             corners.append(basis.element_dofs.T)
             weights.append(np.stack([(np.asarray(field[0]) * basis.dx).sum(axis=1) for field in basis.basis], axis=1))
@@ -95,7 +95,7 @@ class DeadLoad(NodalLoads):
         return float(np.linalg.norm(self.rates(t), axis=1).max())
 
     def resultant(self, number: int) -> np.ndarray:
-        """Force of one of the tractions now, (dim,) [N; N/mm in 2D]."""
+        """Force of one of the tractions now, (dim,) [N; N/mm in 2D]; along r of a body of revolution its sum around."""
         total: np.ndarray = self._areas[number].sum() * self.traction(self._time)[number]
         return total
 

@@ -39,9 +39,9 @@ class FollowerLoads:
 
     Attributes
     ----------
-    values: of each load at the time last given to `at`: a pressure [MPa], or the volume pumped in [mm^dim]; replaced,
-        never changed.
-    areas: of the undeformed boundaries [mm^(dim-1)].
+    values: of each load at the time last given to `at`: a pressure [MPa], or the volume pumped in [mm^volume_dim];
+        replaced, never changed.
+    areas: of the undeformed boundaries [mm^(volume_dim-1)].
 
     Raises
     ------
@@ -73,7 +73,7 @@ class FollowerLoads:
         self.values = np.array([c.value(t) if isinstance(c := _course(load), Ramp) else c * t for load in self.loads])
 
     def rates(self, t: float) -> np.ndarray:
-        """Rates of all loads from load time `t` on, (loads,) [MPa/s; mm^dim/s]."""
+        """Rates of all loads from load time `t` on, (loads,) [MPa/s; mm^volume_dim/s]."""
         return np.array([_rate(load, t) for load in self.loads])
 
     def rate(self, t: float) -> float:
@@ -118,7 +118,8 @@ class FollowerLoads:
         if self._fillings:
             self._last = u.copy()
         part = np.zeros_like(self._wet.X)
-        add_pressure(self._wet.corner, self.pressures(u)[self._wet.owner], self._wet.X + u[self._wet.nodes], part)
+        add_pressure(self._wet.corner, self.pressures(u)[self._wet.owner], self._wet.X + u[self._wet.nodes], part,
+                     self.space.axisymmetric)
         out[self._wet.nodes] += part
 
     def size(self, u: np.ndarray) -> float:
@@ -143,7 +144,7 @@ class FollowerLoads:
         """Work of pressures that go evenly from the `first` to the `last` (loads,)."""
         out = np.empty(self._wet.owner.size)
         swept_volumes(self._wet.corner, self._wet.X + u[self._wet.nodes], end[self._wet.nodes] - u[self._wet.nodes],
-                      np.stack([first[self._wet.owner], last[self._wet.owner]]), out)
+                      np.stack([first[self._wet.owner], last[self._wet.owner]]), out, self.space.axisymmetric)
         return float(out.sum())
 
     def add_stiffness(self, pattern: Pattern, u: np.ndarray, data: np.ndarray) -> None:
@@ -204,7 +205,8 @@ class FollowerLoads:
         """Derivatives of the forces of the facets at `u` under pressures `p` (loads,), (f, k*dim, k*dim)."""
         unknowns = self._wet.facets.nodes.shape[-1] * self.space.dim
         K = np.empty((self._wet.owner.size, unknowns, unknowns))
-        pressure_tangents(self._wet.corner, p[self._wet.owner], self._wet.X + u[self._wet.nodes], K)
+        pressure_tangents(self._wet.corner, p[self._wet.owner], self._wet.X + u[self._wet.nodes], K,
+                          self.space.axisymmetric)
         return K
 
     def stiffening(self, u: np.ndarray) -> np.ndarray | None:
@@ -215,7 +217,7 @@ class FollowerLoads:
         for column, (k, load) in zip(columns, self._fillings):
             part = np.zeros_like(self._wet.X)
             add_pressure(self._wet.corner, np.where(self._wet.owner == k, load.compliance**-0.5, 0.0),
-                         self._wet.X + u[self._wet.nodes], part)
+                         self._wet.X + u[self._wet.nodes], part, self.space.axisymmetric)
             column[self._wet.nodes] = part
         return columns.reshape(len(columns), -1).T
 
@@ -238,7 +240,7 @@ class FollowerLoads:
 
     def _swept(self, u: np.ndarray, facets: Facets) -> np.ndarray:
         out = np.empty(facets.elements.size)
-        swept_volumes(facets.nodes, self.space.X, u, np.ones((2, out.size)), out)
+        swept_volumes(facets.nodes, self.space.X, u, np.ones((2, out.size)), out, self.space.axisymmetric)
         return out
 
     def area(self, u: np.ndarray) -> np.ndarray:

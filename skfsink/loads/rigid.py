@@ -1,6 +1,7 @@
 """Rigid motions that the grips of a body leave free.
 
-A body can move as far as no held degree of freedom resists a translation or a turn of it. Pieces that share no more
+A body can move as far as no held degree of freedom resists a translation or a turn of it; one of revolution can move
+along its axis alone. Pieces that share no more
 than a node (in space: an edge) turn about it, so that each has motions of its own; nodes that pieces share move alike.
 """
 
@@ -58,6 +59,9 @@ def free_motions(space: Space, free: np.ndarray, label: np.ndarray | None = None
     """
     label = pieces(space) if label is None else label
     count, held = int(label.max()) + 1, ~free.reshape(space.X.shape)
+    gripped = held & [False, True] if space.axisymmetric else held
+    if space.axisymmetric:  # rings resist all of these but along the axis
+        held = held | [True, False]
     size = float(np.ptp(space.X, axis=0).max())
     centre = space.X.mean(axis=0)
     X = (space.X - centre) / size
@@ -81,7 +85,7 @@ def free_motions(space: Space, free: np.ndarray, label: np.ndarray | None = None
         columns = (joined[:, None] * nm + np.arange(nm)).ravel()
         values, vectors = np.linalg.eigh(stiffness[np.ix_(columns, columns)])
         nodes = np.concatenate([members[k] for k in joined])
-        if not held[nodes].any() and (sliding is None or not np.isin(nodes, sliding.nodes).any()):
+        if not gripped[nodes].any() and (sliding is None or not np.isin(nodes, sliding.nodes).any()):
             yield Motion(_named(space, label, joined, count), "move", "", unheld=True)
             continue
         null = vectors[:, values < RESISTED * values[-1]].T.reshape(-1, len(joined), nm)
@@ -184,6 +188,8 @@ def moves_as_a_whole(space: Space, loading: Loading, label: np.ndarray) -> bool:
                 if speeds.size and np.ptp(speeds) > 1e-12 * np.abs(speeds).max():
                     return False
                 whole[i] = speeds[0] if speeds.size else 0.0
+            if space.axisymmetric and whole[0] != 0.0:  # it widens
+                return False
             if loading.sliding is not None and whole.any():
                 inside = np.isin(np.arange(space.n_nodes), nodes)[:, None]
                 if np.abs(loading.sliding.across(np.where(inside, whole, 0.0))).max() > 1e-9 * np.abs(whole).max():

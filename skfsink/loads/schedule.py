@@ -32,7 +32,7 @@ class Loading:
 
     Parameters
     ----------
-    space: the mesh.
+    space: the mesh. The nodes on the axis of a body of revolution are held along r, whatever grips say.
     grips, tractions: each with the nodes of its boundary.
     others: loads of other kinds.
     pressures: pressures and fillings, each with the nodes of its boundary.
@@ -54,7 +54,7 @@ class Loading:
     ------
     ParameterError
         A grip or traction has not as many components as the mesh, two grips move a node differently, or a body under
-        tractions or pressures can move as a whole.
+        tractions or pressures can move as a whole; or a grip turns a body of revolution, or moves its axis.
     MeshError
         The mesh has no facet a traction or pressure could act on, or a boundary that is to slide is not flat.
     """
@@ -84,6 +84,8 @@ class Loading:
                     holders[nodes, i] = number
                     free[nodes, i] = False
                     self._moves.append((nodes, i, value))
+        if space.axisymmetric:
+            _hold_axis(space, grips, turned, free)
         self.turns = _turns(space, turned, free)
         self.sliding: SlidingPlanes | None = None
         if oblique:
@@ -120,7 +122,7 @@ class Loading:
     def steady(cls, space: Space, free: np.ndarray, velocity: np.ndarray) -> Loading:
         """Grips that hold all but the degrees of freedom `free` (n*dim,), and move at `velocity` (n, dim) [mm/s]."""
         loading = cls(space, ())
-        loading.free, loading._steady = free, velocity
+        loading.free, loading._steady = loading.free & free, velocity
         return loading
 
     def knot(self, t: float) -> float:
@@ -217,6 +219,20 @@ def _planes(space: Space, grips: Sequence[tuple[np.ndarray, Grip]]
     return along, oblique
 
 
+def _hold_axis(space: Space, grips: Sequence[tuple[np.ndarray, Grip]], turned: Sequence[tuple[np.ndarray, Rotation]],
+               free: np.ndarray) -> None:
+    """Hold the nodes on the axis of revolution along r; refuse a grip that turns the body or moves them there."""
+    if turned:
+        raise ParameterError(f"grip {turned[0][1].boundary} turns a body of revolution, and the element axisymmetric "
+                             f"has no torsion: take a mesh in space")
+    for nodes, grip in grips:
+        value, there = grip.velocity[0], nodes[space.on_axis[nodes]]
+        if there.size and value is not None and (any(value.values) if isinstance(value, Ramp) else value != 0.0):
+            raise ParameterError(f"grip {grip.boundary} moves the node at {place_text(space.X[there[0]])} mm, on the "
+                                 f"axis of revolution, along x: leave x out of it, or end the boundary short of it")
+    free[space.on_axis, 0] = False
+
+
 def _turns(space: Space, grips: Sequence[tuple[np.ndarray, Rotation]], free: np.ndarray) -> list[Turn]:
     """The nodes that grips turn; none of them may be held by another one, and nothing of them is `free` any more."""
     turns = []
@@ -232,6 +248,8 @@ def _turns(space: Space, grips: Sequence[tuple[np.ndarray, Rotation]], free: np.
 
 def _check_held(space: Space, free: np.ndarray, sliding: SlidingPlanes | None) -> None:
     """Refuse a body that can be moved, or turned, without a force: under dead loads it would be."""
+    if space.axisymmetric:  # rings resist all of these but along the axis
+        free = free & [False, True]
     for i in range(space.dim):
         if free[:, i].all() and sliding is None:
             raise ParameterError(f"no grip holds the body in {_AXES[i]}, and a load would carry it away: hold a "

@@ -117,7 +117,7 @@ class WettedSurface:
         x = (self.space.X + u)[self.facets.nodes]
         if self.space.dim == 2:
             length: np.ndarray = np.linalg.norm(x[:, 1] - x[:, 0], axis=1)
-            return length
+            return length * np.pi * x[..., 0].sum(axis=1) if self.space.axisymmetric else length
         one, two = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), np.cross(x[:, 2] - x[:, 3], x[:, 1] - x[:, 3])
         area: np.ndarray = 0.5 * (np.linalg.norm(one, axis=1) + np.linalg.norm(two, axis=1))
         return area

@@ -39,8 +39,8 @@ class InitialCrack:
         choose(f"crack {self.name}: lips", self.lips, LIPS)
 
     def width(self, space: Space) -> float | None:
-        """Volume of the elements over the extent [mm]; None of a set of elements."""
-        return None if self.extent is None else float(space.V[self.elements].sum() / self.extent)
+        """Volume (area, if the mesh is plane) of the elements over the extent [mm]; None of a set of elements."""
+        return None if self.extent is None else float(space.extent[self.elements].sum() / self.extent)
 
 
 def crack_of_elements(space: Space, name: str, elements: np.ndarray, lips: str) -> InitialCrack:

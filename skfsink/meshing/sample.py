@@ -56,6 +56,10 @@ class Sample:
     notes: tuple[str, ...] = ()
     source: str = ""
 
+    def revolved(self) -> Sample:
+        """The sample as the half plane of a body of revolution (MeshError: it has nodes at x < 0)."""
+        return self if self.space.axisymmetric else replace(self, space=self.space.revolved())
+
     def nodes(self, boundary: str) -> np.ndarray:
         """Nodes of a named boundary.
 
@@ -80,12 +84,15 @@ class Sample:
     def rim(self, *faces: str) -> np.ndarray:
         """Nodes of the outer boundary without the named `faces`, but with the edges of these.
 
+        The axis of a body of revolution is no part of it.
+
         Raises
         ------
         MeshError
             The mesh has no such boundary.
         """
         facets = self.space.mesh.facets[:, self.space.mesh.boundary_facets()]
+        facets = facets[:, ~self.space.on_axis[facets].all(axis=0)]
         for name in faces:
             facets = facets[:, ~np.isin(facets, self.nodes(name)).all(axis=0)]
         return np.unique(facets)

@@ -59,7 +59,7 @@ class Newton:
         self.steps = self.iterations = 0
         self._volume = self.space.lump(np.ones_like(self.space.w))
         # a body that has come apart bears no force; this says what counts as none, in the softest material too
-        size = float(self.space.V.sum()) ** (1 - 1 / self.space.dim)
+        size = float(self.space.V.sum()) ** (1 - 1 / self.space.volume_dim)
         self._least_force = 1e-3 * momentum.shear_moduli[0] * size
         # rounding of the stored energy, most in the stiffest one: I1' - 3 is a difference of numbers of order one
         self._noise = 1e-14 * momentum.shear_moduli[1] * float(self.space.V.sum())

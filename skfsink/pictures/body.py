@@ -152,6 +152,6 @@ def extent(space: Space, elements: np.ndarray, x: np.ndarray, gamma: np.ndarray)
     if not len(elements):
         return np.full((2, 2), np.nan)
     piece = joined(space.conn[elements], gamma >= SPENT)
-    volume = np.bincount(piece, space.V[elements])
+    volume = np.bincount(piece, space.extent[elements])
     kept = x[volume[piece] > LEAST_PIECE * volume.sum()].reshape(-1, 2)
     return np.array([kept.min(axis=0), kept.max(axis=0)])

@@ -199,11 +199,16 @@ def _event(history: History) -> tuple[dict[str, np.ndarray], np.ndarray, str, st
     if not rows.size:
         raise ValueError("the history has no rows of the event")
     event = {name: values[rows] for name, values in history.items()}
-    in_space = history.dim == 3 if isinstance(history, Table) else np.isfinite(history["tip_z_mm"]).any()
-    unit = history_units(3 if in_space else 2)["elastic"]
+    unit = history_units(_dimension(history))["elastic"]
     if np.ptp(event["time_s"]) > 0:
         return event, event["time_s"] * 1e6, "time since onset (µs)", unit
     return event, event["step"].astype(float), "pass", unit
+
+
+def _dimension(history: History) -> int:
+    """Dimensions of the body, on which units depend."""
+    in_space = history.dim == 3 if isinstance(history, Table) else np.isfinite(history["tip_z_mm"]).any()
+    return 3 if in_space else 2
 
 
 @matplotlib.rc_context(STYLE)
@@ -213,7 +218,7 @@ def loading_picture(history: History, path: str | Path, title: str = "") -> None
     x, load, gamma = (history[name][rows] for name in ("grip_displacement_mm", "reaction_N_per_mm", "gamma_min"))
     figure = Figure((WIDTH / 2 + 0.6, 4.2), layout="constrained")
     ax, low = figure.subplots(2, 1, sharex=True, height_ratios=[3, 1])
-    unit = "N" if np.isfinite(history["tip_z_mm"]).any() else "N/mm"
+    unit = history_units(_dimension(history))["reaction_N_per_mm"]
     ax.plot(np.append(0, x), np.append(0, load), "k.-", markersize=3)
     ax.set_ylabel(f"load ({unit})")
     low.plot(np.append(0, x), np.append(1, gamma), color=RED)

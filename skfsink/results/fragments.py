@@ -20,25 +20,29 @@ _WHOLE = ("step", "piece", "elements")  # columns of whole numbers
 _AXES = ("x", "y", "z")
 
 
-def fragment_columns(dim: int) -> list[str]:
-    """Names of the columns with their units, after `step` and `time_s`; of a plane body per mm of thickness."""
-    per, axes, turns = "_per_mm" if dim == 2 else "", _AXES[:dim], _AXES[2:] if dim == 2 else _AXES
-    return ["piece", "elements", "area_mm2" if dim == 2 else "volume_mm3", f"mass_t{per}",
+def fragment_columns(dim: int, volume_dim: int) -> list[str]:
+    """Names of the columns with their units, after `step` and `time_s`; of a plane body per mm of thickness.
+
+    They are those of the dimensions of mesh and body, :attr:`.Space.dim` and :attr:`.Space.volume_dim`.
+    """
+    plane = volume_dim == 2
+    per, axes, turns = "_per_mm" if plane else "", _AXES[:dim], _AXES[2:] if dim == 2 else _AXES
+    return ["piece", "elements", "area_mm2" if plane else "volume_mm3", f"mass_t{per}",
             *(f"centre_{axis}_mm" for axis in axes), *(f"velocity_{axis}_mm_per_s" for axis in axes),
             *(f"momentum_{axis}_N_s{per}" for axis in axes), f"kinetic_N_mm{per}", f"translation_N_mm{per}",
             f"rotation_N_mm{per}", *(f"angular_momentum_{axis}_N_mm_s{per}" for axis in turns),
             *(f"spin_{axis}_rad_per_s" for axis in turns)]
 
 
-def write_fragments(path: Path, dim: int, rows: np.ndarray) -> None:
-    """Write the file anew with `rows` (m, columns): step, time, and the columns of :func:`fragment_columns`."""
-    header = ["step", "time_s", *fragment_columns(dim)]
+def write_fragments(path: Path, columns: Sequence[str], rows: np.ndarray) -> None:
+    """Write the file anew with `rows` (m, 2 + columns): step, time, and the `columns` of :func:`fragment_columns`."""
+    header = ["step", "time_s", *columns]
     write_atomic(path, csv_text([header, *_cells(rows, header)]))
 
 
-def append_fragments(path: Path, dim: int, rows: np.ndarray) -> None:
+def append_fragments(path: Path, columns: Sequence[str], rows: np.ndarray) -> None:
     """Add rows to the file (OutputError)."""
-    append_rows(path, _cells(rows, ["step", "time_s", *fragment_columns(dim)]))
+    append_rows(path, _cells(rows, ["step", "time_s", *columns]))
 
 
 def _cells(rows: np.ndarray, header: Sequence[str]) -> list[list[Any]]:
@@ -56,7 +60,8 @@ def read_fragments(path: Path) -> dict[str, np.ndarray]:
     text = finished_lines(path)
     try:
         header, *lines = csv.reader(text)
-        if header[2:] not in (fragment_columns(2), fragment_columns(3)) or any(len(x) != len(header) for x in lines):
+        known = [fragment_columns(*dims) for dims in ((2, 2), (3, 3), (2, 3))]
+        if header[2:] not in known or any(len(x) != len(header) for x in lines):
             raise ValueError
         return {name: np.array([line[i] for line in lines], str).astype(int if name in _WHOLE else float)
                 for i, name in enumerate(header)}

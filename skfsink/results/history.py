@@ -116,7 +116,7 @@ class Table(dict[str, np.ndarray]):
 
     Attributes
     ----------
-    dim: dimensions of the body, 2 or 3.
+    dim: dimensions of the body, 2 or 3; 3 of one of revolution.
     units: of the columns, by name of `HISTORY_COLUMNS`; "" for a column of a file that this does not have.
     without: columns that the file does not have; they have a value for files of before, :attr:`Column.before`.
     """
@@ -142,7 +142,7 @@ class History:
     ----------
     path: of the CSV file, written anew here.
     rows: to start with, from a checkpoint.
-    dim: dimensions of the body, on which the units of forces and energies depend.
+    dim: dimensions of the body, :attr:`.Space.volume_dim`, on which the units of forces and energies depend.
     without: columns that the file does not have; they have a value for files of before, :attr:`Column.before`.
 
     Attributes

@@ -28,8 +28,14 @@ def mean_deformation(momentum: Momentum, u: np.ndarray) -> np.ndarray:
 
 
 def mean_stress(space: Space, force: np.ndarray) -> np.ndarray:
-    """Mean nominal stress of a body in equilibrium under the forces `force` (n, dim) at its nodes [MPa], (3, 3)."""
+    """Mean nominal stress of a body in equilibrium under the forces `force` (n, dim) at its nodes [MPa], (3, 3).
+
+    Of a body of revolution it is that of an even stress, the same along r and around.
+    """
     P = np.zeros((3, 3))
+    if space.axisymmetric:
+        r, z = (force * space.X).sum(axis=0) / space.w.sum()
+        return np.diag([r / 2.0, z, r / 2.0])
     P[:space.dim, :space.dim] = force.T @ space.X / space.w.sum()
     return P
 

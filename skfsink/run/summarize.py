@@ -35,7 +35,7 @@ def summarize(scene: Scene, simulation: Simulation) -> dict[str, Any]:
     space, cost = scene.sample.space, simulation.cost()
     dynamic = scene.controls.analysis == "dynamic"
     without = terms_without(simulation.momentum, dynamic)
-    units = history_units(space.dim)
+    units = history_units(space.volume_dim)
     balances = [abs(row["balance"]) for row in simulation.history.rows if row["phase"] != "loading"]
     ratio, place = greatest_ratio(simulation.density, body.since_begun(state))
     if "ratio" in onset:  # while it was loaded; beyond, W of dead points grows without meaning
@@ -51,7 +51,7 @@ def summarize(scene: Scene, simulation: Simulation) -> dict[str, Any]:
                     "greatest_W_over_phi": ratio, "place_of_greatest_W_over_phi_mm": place},
         "material_point": _material_point(scene, simulation),
         "onset": {"displacement_mm": onset.get("displacement_mm"),
-                  load_name(space.dim): onset.get("reaction_N_per_mm"),
+                  load_name(space.volume_dim): onset.get("reaction_N_per_mm"),
                   **{k: onset.get(k) for k in ("elastic_energy", "gamma_min", "place_mm", "boundary")},
                   "notch": simulation.guard.notch or None},
         "event": {"first_arrival_s": tracker.arrival if dynamic else None,
@@ -90,7 +90,7 @@ def crack_summary(scene: Scene, body: Body) -> list[dict[str, Any]]:
     """Initial cracks: their elements, extent and width, and the width of what they took of the density, all of
     them over their whole extent."""
     state, space = body.begin(), scene.space
-    lost = float(np.einsum("eq,eq->", space.w, 1.0 - body.momentum.effective(state.gamma, state.deleted)))
+    lost = float(np.einsum("eq,eq->", space.dX, 1.0 - body.momentum.effective(state.gamma, state.deleted)))
     extents = [crack.extent for crack in scene.cracks]
     whole = None if None in extents or not extents else sum(extents)  # type: ignore[arg-type]
     extent = "length_mm" if space.dim == 2 else "area_mm2"

@@ -93,6 +93,9 @@ def arrange(case: str, arguments: Mapping[str, Any], options: Options, grips: tu
     if options.half and not mirrors:
         raise ParameterError(f"half: {case} has no half that could be computed alone: {asymmetry}")
     _check_mesh_file(case, arguments["mesh"], options)
+    if options.half and options.element == "axisymmetric" and any(mirror.axis == 0 for mirror in mirrors):
+        raise ParameterError(f"half: with element axisymmetric {case} is a body of revolution about x = 0, which is "
+                             f"not cut along x: leave half out")
     body = Arrangement(grips, lift, faces, thickness=thickness)
     if options.dimensions not in (0, 2 if lift is None else 3):
         body = body.as_slab(_slab_depth(case, arguments["mesh"], options.dimensions))

@@ -31,7 +31,8 @@ class Controls:
     integrator: "explicit" or "hht", for the dynamic event.
     sink: "lumped", "consistent" or "nearest".
     gradient: "monotone" or "gauss", of the lumped and nearest sinks; that of the consistent one is always "gauss".
-    element: "jbar", "plain" or "planestress" (thin sheets in two dimensions).
+    element: "jbar", "plain", "planestress" (thin sheets in two dimensions) or "axisymmetric" (bodies of revolution
+        about the y axis, by their half plane).
     overshoot: how far past the onset the state is scaled before the event, relative to the displacement, (0, 0.1].
     deletion: gamma at which an element fails, (0, 1e-2].
     force_floor: gamma below which a Gauss point exerts no force, [0, 0.1].
@@ -81,9 +82,10 @@ class Controls:
         choose("start", self.start, STARTS)
         if self.start == "rest" and self.analysis != "dynamic":
             raise ParameterError(f"start rest is for analysis dynamic; got {self.analysis}")
-        if self.contact and self.element == "planestress":
-            raise ParameterError("contact is for elements jbar and plain; got planestress: the lips of a thin sheet "
-                                 "buckle out of it")
+        if self.contact and self.element in (why := {
+                "planestress": "the lips of a thin sheet buckle out of it",
+                "axisymmetric": "the medium between lips is not made for rings"}):
+            raise ParameterError(f"contact is for elements jbar and plain; got {self.element}: {why[self.element]}")
         if self.explicit.debris == "remove" and (self.integrator, self.analysis) != ("explicit", "dynamic"):
             raise ParameterError(f"debris remove is for analysis dynamic with integrator explicit; got analysis "
                                  f"{self.analysis}, integrator {self.integrator}: take debris keep")

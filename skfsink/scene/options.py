@@ -129,7 +129,8 @@ class Options:
     front
         Quasi-static: a pass fails the points with at least this share of the greatest stored energy, in [0, 1].
     element
-        "jbar" (element-constant J̄), "plain" (standard Q1, locks) or "planestress" (thin sheet with free faces, in 2D).
+        "jbar" (element-constant J̄), "plain" (standard Q1, locks), "planestress" (thin sheet with free faces, in 2D) or
+        "axisymmetric" (body of revolution about the y axis, J̄; a 2D mesh at x >= 0; figures are of the whole body).
     kernels
         What evaluates the weak forms: "compiled" (element loops) or "forms" (scikit-fem, for small meshes).
     contact

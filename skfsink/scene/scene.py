@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import MeshError, ParameterError, require
 from ..fem.backends import backend
-from ..fem.elements import check_element
+from ..fem.elements import ELEMENTS, check_element
 from ..fem.space import Space
 from ..fields.fragments import joined
 from ..loads.grips import Grip, Ramp, Traction, Velocity
@@ -42,7 +42,7 @@ class Scene:
     case: name of the case module.
     title: for pictures.
     parameters: the arguments of the case function, enough to make this scene again.
-    sample, material, sink_law: what is computed.
+    sample, material, sink_law: what is computed; the element axisymmetric makes the sample one of revolution.
     grips: the reaction of the first one that moves is the load that is reported, along its motion.
     tractions: dead loads; without a grip that moves, the first one is the load that is reported.
     pressures: pressures that follow the surface, given or of a fluid; without a grip that moves and a traction, the
@@ -96,6 +96,8 @@ class Scene:
     model_choice: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        if ELEMENTS[self.controls.element].axisymmetric and self.sample.space.dim == 2:
+            object.__setattr__(self, "sample", self.sample.revolved())
         for boundary in (load.boundary for group in (self.grips, self.rollers, self.tractions, self.pressures)
                          for load in group):
             self.sample.nodes(boundary)

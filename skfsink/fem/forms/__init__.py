@@ -9,8 +9,10 @@ to be assembled on the bases of a :class:`~skfsink.fem.space.Space`:
 
 Fields passed at assembly (at Gauss points unless said otherwise): `displacement` the nodal vector of the displacement
 (skfem interpolates it), `gamma` the relative density (ne, nq), zero in deleted elements, `dV` the quadrature
-weights `basis.dx`, from which element means are made, and `fibres` (ne, nq, families, 3), directions of fibres. What is
-the same for all test functions is found once an assembly.
+weights `basis.dx`, from which element means are made, and `fibres` (ne, nq, families, 3), directions of fibres. A field
+`radius` (ne, nq), the R of the Gauss points, makes the body one of revolution about the axis x = 0: displacements then
+have a gradient u_r/R around it, and `basis` integrates over 2 pi R dA, as those of such a space do. What is the same
+for all test functions is found once an assembly.
 """
 
 from .density import DensityForms, density_forms, row_sums

@@ -7,12 +7,12 @@ from functools import wraps
 from typing import Any, NamedTuple
 
 import numpy as np
-from skfem.helpers import ddot
+from skfem.helpers import ddot, grad
 
 from ...material.crushed import crushed
 from ...material.general import cofactor
 
-__all__ = ["Derivatives", "Kinematics", "element_mean", "kinematics", "once", "volume_derivatives"]
+__all__ = ["Derivatives", "Kinematics", "element_mean", "kinematics", "once", "slope", "volume_derivatives"]
 
 
 def element_mean(values: Any, dV: Any) -> np.ndarray:
@@ -32,8 +32,24 @@ def once(function: Callable[[Any], Any]) -> Callable[[Any], Any]:
     return kept
 
 
+def slope(field: Any, w: Any) -> np.ndarray:
+    """Gradient of a displacement, (dim, dim, ne, nq); with the field `radius`, R, that of a body of revolution.
+
+    It is (3, 3, ne, nq) then, with u_r/R around the axis.
+    """
+    in_plane: np.ndarray = grad(field)
+    if "radius" not in w:
+        return in_plane
+    H = np.zeros((3, 3, *in_plane.shape[2:]))
+    H[:2, :2] = in_plane
+    H[2, 2] = np.asarray(field)[0] / w["radius"]
+    return H
+
+
 class Kinematics(NamedTuple):
     """Deformation at the Gauss points; vectors and tensors come first in the shape.
+
+    A body of revolution counts as one of dim = 3, with axes r, z (x, y of the mesh) and around.
 
     Attributes
     ----------
@@ -58,7 +74,7 @@ class Kinematics(NamedTuple):
 
 @once
 def kinematics(w: Any) -> Kinematics:
-    H = np.moveaxis(w["displacement"].grad, (0, 1), (-2, -1))
+    H = np.moveaxis(slope(w["displacement"], w), (0, 1), (-2, -1))
     dim = H.shape[-1]
     F = np.broadcast_to(np.eye(3), (*H.shape[:-2], 3, 3)).copy()
     F[..., :dim, :dim] += H

@@ -8,14 +8,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from skfem import BilinearForm, Functional, LinearForm
-from skfem.helpers import ddot, dot, grad
+from skfem.helpers import ddot, dot
 
 from ...material import GeneralMaterial, Material
 from ...material.crushed import J_FLOOR
 from ..kernels import ERSATZ_STIFFNESS, SOFT_GAMMA
-from .kinematics import element_mean, kinematics, once, volume_derivatives
+from .kinematics import element_mean, kinematics, once, slope, volume_derivatives
 
 __all__ = ["MomentumForms", "dilatation", "ersatz", "mass_form", "momentum_forms", "tangents"]
+
+#: components of F of a body of revolution that can be other than 0
+IN_HALF_PLANE = np.array([[1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
 
 
 @dataclass(frozen=True)
@@ -62,12 +65,12 @@ def momentum_forms(material: Material, j_bar: bool = True) -> MomentumForms:
     def residual(v: Any, w: Any) -> np.ndarray:
         at, (_, dpsi, _) = kinematics(w), isochoric(w)
         dI1 = at.R * (2 * at.F - 2 / 3 * at.tr_C * at.F_invT)
-        return ddot(w["gamma"] * dpsi * dI1 + volumetric(w).pressure * at.cofactor, grad(v))
+        return ddot(w["gamma"] * dpsi * dI1 + volumetric(w).pressure * at.cofactor, slope(v, w))
 
     def second(du: Any, v: Any, w: Any, convex: bool) -> np.ndarray:
         at, (_, dpsi, ddpsi), gamma = kinematics(w), isochoric(w), np.asarray(w["gamma"])
         scale = at.R
-        a, b = grad(du), grad(v)
+        a, b = slope(du, w), slope(v, w)
         dI1 = scale * (2 * at.F - 2 / 3 * at.tr_C * at.F_invT)
         volume = volume_derivatives(a, b, w)
         cross = volume.a * volume.b - volume.both
@@ -85,7 +88,9 @@ def momentum_forms(material: Material, j_bar: bool = True) -> MomentumForms:
         at, (_, dpsi, _) = kinematics(w), isochoric(w)
         c = np.asarray(w["gamma"]) * dpsi * at.R
         least = at.J_e  # product of two stretches that the deformation can turn
-        if len(at.F) == 3:
+        if "radius" in w:
+            least = at.J_e / np.maximum(at.F[2, 2], J_FLOOR)  # nothing turns what goes around
+        elif len(at.F) == 3:
             C = np.einsum("...iJ,...iL->...JL", at.full, at.full)
             least = at.J_e / np.sqrt(np.linalg.eigvalsh(C)[..., -1])
         return 2 / 3 * at.tr_C * c - 2 * c * least, 2 / 3 * at.tr_C * c + 2 * c * least
@@ -135,7 +140,7 @@ def _general_forms(material: GeneralMaterial, j_bar: bool) -> MomentumForms:
 
     @LinearForm
     def residual(v: Any, w: Any) -> np.ndarray:
-        return ddot(w["gamma"] * isochoric_stress(w) + volumetric(w).pressure * kinematics(w).cofactor, grad(v))
+        return ddot(w["gamma"] * isochoric_stress(w) + volumetric(w).pressure * kinematics(w).cofactor, slope(v, w))
 
     @once
     def modulus(w: Any) -> np.ndarray:
@@ -152,6 +157,8 @@ def _general_forms(material: GeneralMaterial, j_bar: bool) -> MomentumForms:
         """The modulus without its negative eigenvalues, and less the coupling that the point has by itself."""
         at, A = kinematics(w), modulus(w)
         dim = len(at.F)
+        if "radius" in w:  # the others are no deformation of a body of revolution
+            A = A * IN_HALF_PLANE[:, :, None, None, None, None] * IN_HALF_PLANE[..., None, None]
         coupling = np.zeros_like(A)
         if not j_bar:
             coupling = w["gamma"] * k * np.einsum("iJ...,kL...->iJkL...", at.cofactor, at.cofactor)
@@ -161,7 +168,7 @@ def _general_forms(material: GeneralMaterial, j_bar: bool) -> MomentumForms:
         return positive.reshape(A.shape) - coupling
 
     def second(du: Any, v: Any, w: Any, convex: bool) -> np.ndarray:
-        a, b = grad(du), grad(v)
+        a, b = slope(du, w), slope(v, w)
         A = convex_modulus(w) if convex else modulus(w)
         return (np.einsum("iJ...,iJkL...,kL...->...", b, A, a) + volumetric(w).coupling(a, b, w)
                 + ersatz(material, a, b, w))
@@ -198,4 +205,4 @@ def mass_form(material: Material) -> BilinearForm:
 
 @LinearForm
 def dilatation(v: Any, w: Any) -> np.ndarray:
-    return ddot(kinematics(w).cofactor, grad(v))
+    return ddot(kinematics(w).cofactor, slope(v, w))

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 from skfem import BilinearForm, LinearForm
-from skfem.helpers import dot, grad, mul
+from skfem.helpers import dot
 
-from .kinematics import kinematics, once
+from .kinematics import kinematics, once, slope
 
 __all__ = ["PressureForms", "pressure_forms"]
 
@@ -18,7 +18,8 @@ __all__ = ["PressureForms", "pressure_forms"]
 class PressureForms:
     """Forms on a `FacetBasis`, whose normal `w.n` is N of the undeformed surface; n da = cof(F) N dA (Nanson).
 
-    Fields at assembly: `displacement`, and `pressure` [MPa], a number or one for each facet and point.
+    Fields at assembly: `displacement`, and `pressure` [MPa], a number or one for each facet and point; `radius` as in
+    the momentum balance.
 
     Attributes
     ----------
@@ -36,7 +37,8 @@ def pressure_forms() -> PressureForms:
     @once
     def area(w: Any) -> np.ndarray:
         """cof(F) N."""
-        return mul(kinematics(w).cofactor, w.n)
+        plane = len(w.n)
+        return np.einsum("ij...,j...->i...", kinematics(w).cofactor[:plane, :plane], w.n)
 
     @LinearForm
     def residual(v: Any, w: Any) -> np.ndarray:
@@ -44,9 +46,9 @@ def pressure_forms() -> PressureForms:
 
     @BilinearForm
     def tangent(du: Any, v: Any, w: Any) -> np.ndarray:
-        F_invT, H = kinematics(w).F_invT, grad(du)
+        F_invT, H, plane = kinematics(w).F_invT, slope(du, w), len(w.n)
         divergence = np.einsum("ij...,ij...->...", F_invT, H)
-        turned = np.einsum("ij...,kj...,k...->i...", F_invT, H, area(w))
+        turned = np.einsum("ij...,kj...,k...->i...", F_invT[:plane, :plane], H[:plane, :plane], area(w))
         return w["pressure"] * (divergence * dot(v, area(w)) - dot(v, turned))
 
     return PressureForms(residual, tangent)

@@ -7,10 +7,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from skfem import BilinearForm, Functional, LinearForm
-from skfem.helpers import ddot, grad
+from skfem.helpers import ddot
 
 from ...material import Material
-from .kinematics import element_mean, kinematics, once
+from .kinematics import element_mean, kinematics, once, slope
 
 __all__ = ["BulkViscosity", "ViscousForms", "viscous_forms"]
 
@@ -73,28 +73,29 @@ def viscous_forms(material: Material, bulk: BulkViscosity, sheet: bool = False) 
     @once
     def volume_rate(w: Any) -> _Bulk:
         dV = np.asarray(w["dV"])
-        length = np.broadcast_to(dV.sum(axis=-1, keepdims=True), dV.shape) ** (1 / len(kinematics(w).F))
-        D = element_mean(ddot(kinematics(w).cofactor, grad(w["velocity"])), dV)
+        extent, dim = (dV / (2 * np.pi * w["radius"]), 2) if "radius" in w else (dV, len(kinematics(w).F))
+        length = np.broadcast_to(extent.sum(axis=-1, keepdims=True), dV.shape) ** (1 / dim)
+        D = element_mean(ddot(kinematics(w).cofactor, slope(w["velocity"], w)), dV)
         return _Bulk(material.rho0 * c_d * length, D, -length / c_d * np.minimum(D, 0.0))
 
     @once
     def newtonian(w: Any) -> np.ndarray:
-        return weight(w) * stress(rate(grad(w["velocity"]), w))
+        return weight(w) * stress(rate(slope(w["velocity"], w), w))
 
     @LinearForm
     def force(v: Any, w: Any) -> np.ndarray:
         at = volume_rate(w)
         q = at.scale * (bulk.linear + bulk.quadratic**2 * at.compression) * at.D
-        return (ddot(newtonian(w), rate(grad(v), w))
-                + element_mean(w["gamma"], w["dV"]) * q * ddot(kinematics(w).cofactor, grad(v)))
+        return (ddot(newtonian(w), rate(slope(v, w), w))
+                + element_mean(w["gamma"], w["dV"]) * q * ddot(kinematics(w).cofactor, slope(v, w)))
 
     @BilinearForm
     def tangent(dv: Any, v: Any, w: Any) -> np.ndarray:
         at, cofactor = volume_rate(w), kinematics(w).cofactor
-        slope = at.scale * bulk.slope(np.maximum(at.compression, w["compression"]))
-        one, other = (element_mean(ddot(cofactor, grad(field)), w["dV"]) for field in (dv, v))
-        return (weight(w) * ddot(stress(rate(grad(dv), w)), rate(grad(v), w))
-                + element_mean(w["gamma"], w["dV"]) * slope * one * other)
+        stiffening = at.scale * bulk.slope(np.maximum(at.compression, w["compression"]))
+        one, other = (element_mean(ddot(cofactor, slope(field, w)), w["dV"]) for field in (dv, v))
+        return (weight(w) * ddot(stress(rate(slope(dv, w), w)), rate(slope(v, w), w))
+                + element_mean(w["gamma"], w["dV"]) * stiffening * one * other)
 
     @Functional
     def compression(w: Any) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Internal force of four-node quadrilaterals in plane strain, tile by tile.
+"""Internal force of four-node quadrilaterals in plane strain, or of a body of revolution, tile by tile.
 
 With F = Grad x, J = det F and  I1' = J^(-2/3) (F:F + 1), the element potential for fixed gamma is
 
@@ -10,7 +10,8 @@ and its derivative is  f_a = sum_q P_q Grad N_a  with  P = a F + b cof F,
     a = 2 w gamma psi' J^(-2/3),    b = w p - a (F:F + 1)/(3 J),    p = gamma_bar k (J_bar - 1).
 
 Gradients are taken in the reference square, where they are differences of nodal values, and carried to X by the
-stored d xi/d X. Each function below is one pass over the lanes of a tile and vectorises.
+stored d xi/d X. Each function below is one pass over the lanes of a tile and vectorises. Passes of :mod:`.hoop` add
+what goes around the axis of a body of revolution.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import numpy as np
 
 from ...material.compiled import isochoric_law
 from ...system.jit import njit
+from .hoop import AROUND, add_hoop_force, hoop_stress, hoop_stretch, ratio_around
 from .lanes import (
     FAST,
     GAUSS_HIGH,
@@ -34,7 +36,8 @@ from .lanes import (
 # (row + q) * LANES + i, so that what is done point by point is one loop over 4 * LANES numbers.
 F_XX, F_XY, F_YX, F_YY = 0, 4, 8, 12
 J_ROW, I1_ROW, R_ROW, PSI, DPSI, FLOORED, TRACE = 16, 20, 24, 28, 32, 36, 40  # FLOORED: J at first, then 1/J
-ROWS = 44
+HOOP = 44  # r/R of a body of revolution
+ROWS = 48
 XI_X, XI_Y, ETA_X, ETA_Y, WEIGHT = 0, 4, 8, 12, 16  # geometry: d xi/d X by component, then the weights
 
 
@@ -198,13 +201,16 @@ def force_2d(address, constants, volumetric_part, x, elements):  # type: ignore[
     t, p, ab = np.empty(4 * Q), np.empty(2 * LANES), np.empty(2 * Q)
     pressure, volumetric, ddpsi = np.empty(Q), np.empty(Q), np.empty(Q)
     J, I1, R, psi_q = points(ws, J_ROW), points(ws, I1_ROW), points(ws, R_ROW), points(ws, PSI)
-    dpsi, floored = points(ws, DPSI), points(ws, FLOORED)
-    least = np.ones(Q)
+    dpsi, floored, tr, f = points(ws, DPSI), points(ws, FLOORED), points(ws, TRACE), points(ws, HOOP)
+    least, revolved, hoop = np.ones(Q), geometry.shape[1] > AROUND, np.empty(Q)
     for b in range(conn.shape[0]):
         geo, g = geometry[b].reshape(-1), gamma[b].reshape(-1)
         w = geo[WEIGHT * LANES:]
         _gather(conn[b], x, z)
         _kinematics(z, geo, ws)
+        if revolved:
+            ratio_around(z, geo[AROUND * LANES:], f)
+            hoop_stretch(f, J, floored, tr)
         least_live(J, g, least)
         guess_inverse_cbrt(floored.view(np.int64), R.view(np.int64))
         refine_inverse_cbrt(floored, R)
@@ -217,8 +223,12 @@ def force_2d(address, constants, volumetric_part, x, elements):  # type: ignore[
         else:
             _dilatation_plain(g, k_bulk, J, pressure, volumetric)
         _coefficients(ws, w, g, pressure, ab)
+        if revolved:
+            hoop_stress(ws, f, geo[AROUND * LANES:], ab, hoop)
         _stress(ws, geo, ab, t)
         _nodal_force(t, force[b].reshape(-1))
+        if revolved:
+            add_hoop_force(hoop, force[b].reshape(-1))
         density = W[b].reshape(-1)
         _add(psi_q, volumetric, density)
         _energy(w, g, density, psi[b])

@@ -6,8 +6,9 @@ The element potential is that of :mod:`.force2d`, with psi(I1', I2', I4', ...). 
     a = 2 w gamma (psi_1 R + psi_2 R^2 tr C),   e = 2 w gamma psi_2 R^2,   c_f = 2 w gamma psi_f R,   R = J^(-2/3),
     b = w p - w gamma [2/3 (psi_1 I1' + sum_f psi_f I_f') + 4/3 psi_2 I2']/J.
 
-In plane strain  tr C F - F C = F + J cof F  in the plane, so that e is not needed. `fibres` holds the directions A_f of
-each element, three rows for each family, tiled.
+With F_33 = f the components of  tr C F - F C  are  f^2 F + J cof F  in the plane, of its F, J and cof F, and  (F:F) f
+across it: in plane strain e is not needed. `fibres` holds the directions A_f of each element, three rows for each
+family, tiled.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import numpy as np
 from ...material.compiled import general_law
 from ...system.jit import njit
 from . import force2d, force3d
+from .hoop import AROUND, add_hoop_force, hoop_stress, hoop_stretch, ratio_around
 from .lanes import FAST, LANES, LANES_3D, continue_below_floor, guess_inverse_cbrt, refine_inverse_cbrt
 
 __all__ = ["force_general_2d", "force_general_3d"]
@@ -54,7 +56,7 @@ def _coefficients(w, gamma, pressure, isochoric, ab, c):  # type: ignore[no-unty
             ab[Q + i] -= 2.0 / 3.0 * wg * d[f, i] * I[f, i] * inverse[i]
 
 
-# --- quadrilaterals in plane strain ---
+# --- quadrilaterals ---
 @njit(fastmath=FAST)
 def _invariants_2d(ws, J, tr, R, fibres, I):  # type: ignore[no-untyped-def]
     for i in range(_Q):
@@ -74,6 +76,43 @@ def _second_2d(J, c, ab):  # type: ignore[no-untyped-def]
     for i in range(_Q):
         ab[i] += c[0, i]
         ab[_Q + i] += c[0, i] * J[i]
+
+
+@njit(fastmath=FAST)
+def _invariants_around(ws, f, J, tr, R, fibres, I):  # type: ignore[no-untyped-def]
+    """Those of :func:`_invariants_2d` in a body of revolution, J and tr with the stretch f around it."""
+    for i in range(_Q):
+        square = f[i] * f[i]
+        plane = ws[i] * ws[3 * _Q + i] - ws[_Q + i] * ws[2 * _Q + i]
+        I[0, i] = R[i] * tr[i]
+        I[1, i] = R[i] * R[i] * (plane * plane + square * (tr[i] - square))
+    for n in range(2, I.shape[0]):
+        A = fibres[3 * n - 6:3 * n - 3]
+        for q in range(4):
+            for i in range(LANES):
+                k = q * LANES + i
+                n0, n1 = ws[k] * A[0, i] + ws[_Q + k] * A[1, i], ws[2 * _Q + k] * A[0, i] + ws[3 * _Q + k] * A[1, i]
+                I[n, k] = R[k] * (n0 * n0 + n1 * n1 + f[k] * f[k] * A[2, i] * A[2, i])
+
+
+@njit(fastmath=FAST)
+def _second_around(ws, f, tr, around, c, ab, hoop):  # type: ignore[no-untyped-def]
+    """What :func:`_second_2d` adds, after :func:`.hoop_stress`."""
+    for i in range(_Q):
+        square = f[i] * f[i]
+        ab[i] += c[0, i] * square
+        ab[_Q + i] += c[0, i] * (ws[i] * ws[3 * _Q + i] - ws[_Q + i] * ws[2 * _Q + i])
+        hoop[i] += c[0, i] * (tr[i] - square) * f[i] * around[i]
+
+
+@njit(fastmath=FAST)
+def _fibre_stress_around(f, fibres, around, c, hoop):  # type: ignore[no-untyped-def]
+    for n in range(1, c.shape[0]):
+        A = fibres[3 * n - 1]
+        for q in range(4):
+            for i in range(LANES):
+                k = q * LANES + i
+                hoop[k] += c[n, k] * f[k] * A[i] * A[i] * around[k]
 
 
 @njit(fastmath=FAST)
@@ -106,17 +145,25 @@ def force_general_2d(address, constants, volumetric_part, x, elements):  # type:
     I, d, dd, c = np.empty((m, _Q)), np.zeros((m, _Q)), np.zeros((m, m, _Q)), np.empty((m - 1, _Q))
     J, R, psi_q = force2d.points(ws, force2d.J_ROW), force2d.points(ws, force2d.R_ROW), np.empty(_Q)
     floored, tr = force2d.points(ws, force2d.FLOORED), force2d.points(ws, force2d.TRACE)
+    f, hoop, revolved = force2d.points(ws, force2d.HOOP), np.empty(_Q), geometry.shape[1] > AROUND
     least = np.ones(_Q)
     for b in range(conn.shape[0]):
         geo, g = geometry[b].reshape(-1), gamma[b].reshape(-1)
         w = geo[force2d.WEIGHT * LANES:]
         force2d._gather(conn[b], x, z)
+        around = geo[AROUND * LANES:]
         force2d._kinematics(z, geo, ws)
+        if revolved:
+            ratio_around(z, around, f)
+            hoop_stretch(f, J, floored, tr)
         force2d.least_live(J, g, least)
         guess_inverse_cbrt(floored.view(np.int64), R.view(np.int64))
         refine_inverse_cbrt(floored, R)
         continue_below_floor(J, floored, R)
-        _invariants_2d(ws, J, tr, R, fibres[b], I)
+        if revolved:
+            _invariants_around(ws, f, J, tr, R, fibres[b], I)
+        else:
+            _invariants_2d(ws, J, tr, R, fibres[b], I)
         law(I, constants, psi_q, d, dd)
         if j_bar:
             force2d._dilatation(geo, g, k_bulk, ws, p)
@@ -124,10 +171,17 @@ def force_general_2d(address, constants, volumetric_part, x, elements):  # type:
         else:
             force2d._dilatation_plain(g, k_bulk, J, pressure, volumetric)
         _coefficients(w, g, pressure, _Isochoric(R, floored, I, d), ab, c)  # floored: by now 1/J
-        _second_2d(J, c, ab)
+        if revolved:
+            hoop_stress(ws, f, around, ab, hoop)
+            _second_around(ws, f, tr, around, c, ab, hoop)
+            _fibre_stress_around(f, fibres[b], around, c, hoop)
+        else:
+            _second_2d(J, c, ab)
         force2d._stress(ws, geo, ab, t)
         _fibre_stress_2d(ws, geo, fibres[b], c, t)
         force2d._nodal_force(t, force[b].reshape(-1))
+        if revolved:
+            add_hoop_force(hoop, force[b].reshape(-1))
         density = W[b].reshape(-1)
         force2d._add(psi_q, volumetric, density)
         force2d._energy(w, g, density, psi[b])

@@ -5,7 +5,8 @@ With A_iJkL the second derivative of  w gamma psi + w p J  at fixed p, one eleme
     K_ai,bk = gamma_bar k V b b^T + sum_q (Grad N_a)_J A_iJkL (Grad N_b)_L.
 
 With `convex` the negative eigenvalues of every A, a matrix (dim^2, dim^2), are set to zero: the tangent is then
-positive semidefinite at every point, and unchanged where no point is unstable.
+positive semidefinite at every point, and unchanged where no point is unstable. In a body of revolution A is a matrix
+(5, 5), with the component F_33 last, whose variation is N_a/R along r.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ def tangent_general(space: Space, pattern: Pattern, material: GeneralMaterial, u
     `fibres` (number of `elements`, families, 3) are directions.
     """
     data, x = np.zeros(pattern.nnz), space.X + u
-    loop = _tangent_2d if space.dim == 2 else _tangent_3d
+    loop = _tangent_around if space.axisymmetric else _tangent_2d if space.dim == 2 else _tangent_3d
     solid = Solid(material.bulk_modulus, material.shear_modulus, j_bar, convex)
     for piece in pieces(space, pattern, gamma, elements, fibres):
         loop(material.compiled_law.address, material.constants, solid, x, piece, data)
@@ -134,14 +135,23 @@ def _project(A):  # type: ignore[no-untyped-def]
                     A[i, j] -= values[r] * vectors[i, r] * vectors[j, r]
 
 
-def _make(dim: int) -> Callable[..., Any]:
+@njit
+def _in_half_plane(whole, A):  # type: ignore[no-untyped-def]
+    """The rows and columns (i, J) of the `whole` (9, 9) that a body of revolution has: 00, 01, 10, 11 and 22."""
+    for row in range(5):
+        r = 8 if row == 4 else row + row // 2
+        for column in range(5):
+            A[row, column] = whole[r, 8 if column == 4 else column + column // 2]
+
+
+def _make(dim: int, revolved: bool = False) -> Callable[..., Any]:
     """The element loop for one dimension, with its sizes as constants."""
     na = 2**dim
-    nd, n2 = na * dim, dim * dim
-    _, volumetric_coupling, scatter = parts(dim)
+    nd, n2 = na * dim, dim * dim + revolved
+    _, volumetric_coupling, scatter = parts(dim, revolved)
 
     @njit(**PART)
-    def add(dN, where, A, T, K):  # type: ignore[no-untyped-def]
+    def add(dN, around, where, A, T, K):  # type: ignore[no-untyped-def]
         """Adds (Grad N_a)_J A_iJkL (Grad N_b)_L of a Gauss point on the upper triangle."""
         e, q = where
         for bb in range(na):
@@ -150,6 +160,8 @@ def _make(dim: int) -> Callable[..., Any]:
                     s = 0.0
                     for L in range(dim):
                         s += A[row, dim * k + L] * dN[e, q, bb, L]
+                    if revolved and k == 0:
+                        s += A[row, n2 - 1] * around[e, q, bb]
                     T[row, k] = s
             for a in range(bb + 1):
                 for i in range(dim):
@@ -157,6 +169,8 @@ def _make(dim: int) -> Callable[..., Any]:
                         s = 0.0
                         for j in range(dim):
                             s += dN[e, q, a, j] * T[dim * i + j, k]
+                        if revolved and i == 0:
+                            s += around[e, q, a] * T[n2 - 1, k]
                         K[dim * a + i, dim * bb + k] += s
 
     @njit(cache=True, nogil=True)
@@ -166,6 +180,7 @@ def _make(dim: int) -> Callable[..., Any]:
         conn, dN, w, gamma, slot, fibres = piece.conn, piece.dN, piece.w, piece.gamma, piece.slot, piece.fibres
         m = 2 + fibres.shape[1]
         K, A, T = np.empty((nd, nd)), np.empty((n2, n2)), np.empty((n2, dim))
+        whole = np.empty((9, 9))
         F, G, b = np.zeros((na, 3, 3)), np.empty((na, 3, 3)), np.empty(nd)
         C, B, X, n = np.empty((3, 3)), np.empty((3, 3)), np.empty((m, 3, 3)), np.zeros((na, m, 2, 3))
         J, tr, R, psi = np.empty(na), np.empty(na), np.empty(na), np.empty(na)
@@ -182,6 +197,10 @@ def _make(dim: int) -> Callable[..., Any]:
                         for a in range(na):
                             s += x[conn[e, a], i] * dN[e, q, a, j]
                         F[q, i, j] = s
+                if revolved:
+                    F[q, 2, 2] = 0.0
+                    for a in range(na):
+                        F[q, 2, 2] += x[conn[e, a], 0] * piece.around[e, q, a]
                 _cofactor(F[q], G[q])
                 J[q] = F[q, 0, 0] * G[q, 0, 0] + F[q, 0, 1] * G[q, 0, 1] + F[q, 0, 2] * G[q, 0, 2]
                 R[q] = max(J[q], J_FLOOR) ** (-2.0 / 3.0)
@@ -208,6 +227,8 @@ def _make(dim: int) -> Callable[..., Any]:
                         s = 0.0
                         for j in range(dim):
                             s += G[q, i, j] * dN[e, q, a, j]
+                        if revolved and i == 0:
+                            s += G[q, 2, 2] * piece.around[e, q, a]
                         b[dim * a + i] += w[e, q] * s
                 G[q] /= max(J[q], J_FLOOR)
                 if J[q] < J_FLOOR:
@@ -229,18 +250,24 @@ def _make(dim: int) -> Callable[..., Any]:
                     if J[q] < J_FLOOR:
                         volume *= crush_factor(J[q]) ** 2
                 _slopes(F[q], G[q], C, B, n[q], tr[q], X)
-                _modulus(dim, F[q], G[q], C, B, n[q], tr[q], R[q], I[:, q], d[:, q], dd[:, :, q], X, wg, pressure,
-                         volume, A)
+                if revolved:
+                    _modulus(3, F[q], G[q], C, B, n[q], tr[q], R[q], I[:, q], d[:, q], dd[:, :, q], X, wg, pressure,
+                             volume, whole)
+                    _in_half_plane(whole, A)
+                else:
+                    _modulus(dim, F[q], G[q], C, B, n[q], tr[q], R[q], I[:, q], d[:, q], dd[:, :, q], X, wg, pressure,
+                             volume, A)
                 if convex:
                     _project(A)
                 if gamma[e, q] < SOFT_GAMMA:
                     for i in range(n2):
                         A[i, i] += w[e, q] * ERSATZ_STIFFNESS * mu
-                add(dN, (e, q), A, T, K)
+                add(dN, piece.around, (e, q), A, T, K)
             scatter(K, slot, e, data)
 
     return loop
 
 
 _tangent_2d = _make(2)
+_tangent_around = _make(2, revolved=True)
 _tangent_3d = _make(3)

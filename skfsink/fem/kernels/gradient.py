@@ -8,7 +8,8 @@ points lie at the ends of the element along some of its axes s:
 All of them are quadratures of the same integral. Of s and t those are taken whose positive off-diagonals have the least
 sum, and of several such the least trace. What is still positive, D = max(0, off-diagonals), becomes a flux between its
 two nodes:  K - D + diag(D 1), which is symmetric, has no row sums and no negative eigenvalues. Rules whose Jacobian is
-not positive at all points, as at the corner of an element that is not convex, are left out.
+not positive at all points, as at the corner of an element that is not convex, are left out. In a body of revolution all
+rules have the weight 2 pi R.
 """
 
 from __future__ import annotations
@@ -30,8 +31,10 @@ LEAST_JACOBIAN = 1e-6    #: of the mean one, at the points of a rule that is use
 def monotone_laplacian(space: Space, pattern: Pattern, coefficient: float) -> np.ndarray:
     """Data of  int coefficient Grad N_a . Grad N_b  on a scalar pattern, without positive off-diagonals."""
     data = np.zeros(pattern.nnz)
-    gradients = np.array([shape_functions(points(space.dim, ends))[1] for ends in range(1, 2**space.dim)])
-    _laplacian(space.X[space.conn], space.dN, space.w, gradients, coefficient, pattern.slot, data)
+    rules = [shape_functions(points(space.dim, ends)) for ends in range(1, 2**space.dim)]
+    N, gradients = (np.array(values) for values in zip(*rules))
+    _laplacian(space.X[space.conn], space.dN, (space.w, space.dX), (N, gradients, space.axisymmetric), coefficient,
+               pattern.slot, data)
     return data
 
 
@@ -53,7 +56,9 @@ def _monotone(matrices, usable, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _laplacian(x, dN, w, gradients, coefficient, slot, data):  # type: ignore[no-untyped-def]
+def _laplacian(x, dN, weights, ends, coefficient, slot, data):  # type: ignore[no-untyped-def]
+    w, dX = weights
+    N, gradients, revolved = ends
     ne, nq, na, dim = dN.shape
     rules = 1 + gradients.shape[0]
     matrices, K = np.zeros((rules, na, na)), np.empty((na, na))
@@ -61,7 +66,7 @@ def _laplacian(x, dN, w, gradients, coefficient, slot, data):  # type: ignore[no
     for e in range(ne):
         volume = 0.0
         for q in range(nq):
-            volume += w[e, q]
+            volume += dX[e, q]
         for a in range(na):
             for b in range(na):
                 total = 0.0
@@ -71,7 +76,8 @@ def _laplacian(x, dN, w, gradients, coefficient, slot, data):  # type: ignore[no
                 matrices[0, a, b] = total
         if _positive(matrices[0], matrices[0], 0.0) > 0.0:
             for s in range(1, rules):
-                usable[s] = _stiffness(x[e], gradients[s - 1], LEAST_JACOBIAN * volume, matrices[s])
+                rule = N[s - 1], gradients[s - 1], revolved
+                usable[s] = _stiffness(x[e], rule, LEAST_JACOBIAN * volume, matrices[s])
         _blend(matrices, usable, K)
         _move(K)
         for a in range(na):
@@ -81,8 +87,9 @@ def _laplacian(x, dN, w, gradients, coefficient, slot, data):  # type: ignore[no
 
 
 @njit(cache=True)
-def _stiffness(x, gradients, least, K):  # type: ignore[no-untyped-def]
+def _stiffness(x, rule, least, K):  # type: ignore[no-untyped-def]
     """Int Grad N_a . Grad N_b by a rule with reference `gradients` (nq, na, dim); False if a Jacobian is too small."""
+    N, gradients, revolved = rule
     nq, na, dim = gradients.shape
     J, C, c = np.empty((dim, dim)), np.empty((dim, dim)), np.empty((na, dim))
     K[:] = 0.0
@@ -100,12 +107,18 @@ def _stiffness(x, gradients, least, K):  # type: ignore[no-untyped-def]
                 c[a, i] = 0.0
                 for k in range(dim):
                     c[a, i] += C[i, k] * gradients[q, a, k]
+        scale = nq * det
+        if revolved:
+            radius = 0.0
+            for a in range(na):
+                radius += N[q, a] * x[a, 0]
+            scale /= 2.0 * np.pi * max(radius, 1e-300)
         for a in range(na):
             for b in range(na):
                 total = 0.0
                 for i in range(dim):
                     total += c[a, i] * c[b, i]
-                K[a, b] += total / (nq * det)
+                K[a, b] += total / scale
     return True
 
 

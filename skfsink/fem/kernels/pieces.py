@@ -24,13 +24,14 @@ def pieces(space: Space, pattern: Pattern, gamma: np.ndarray, elements: np.ndarr
     if fibres is None:
         fibres = np.empty((space.n_elements if elements is None else elements.size, 0, 3))
     whole = space.conn, space.dN, space.w, np.ascontiguousarray(gamma), pattern.slot
+    around = space.around if space.axisymmetric else np.empty((space.n_elements, 0, space.conn.shape[1]))
     if elements is None:
-        yield Piece(*whole, np.ascontiguousarray(fibres))
+        yield Piece(*whole, np.ascontiguousarray(fibres), around)
         return
     for start in range(0, elements.size, PIECE):
         part = slice(start, start + PIECE)
         conn, dN, w, at_points, slot = (_taken(array, elements[part]) for array in whole)
-        yield Piece(conn, dN, w, at_points, slot, np.ascontiguousarray(fibres[part]))
+        yield Piece(conn, dN, w, at_points, slot, np.ascontiguousarray(fibres[part]), around[elements[part]])
 
 
 def _taken(array: np.ndarray, rows: np.ndarray) -> np.ndarray:

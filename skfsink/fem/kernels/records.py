@@ -17,7 +17,8 @@ class Elements(NamedTuple):
     Attributes
     ----------
     conn: nodes.
-    geometry: d xi/d X by component, then the quadrature weights, each at all Gauss points.
+    geometry: d xi/d X by component, then the quadrature weights, and of a body of revolution 1/R, each at all Gauss
+        points.
     gamma: relative density at the Gauss points.
     fibres: directions, three rows for each family.
     force: forces on the nodes, by node, then component.
@@ -74,7 +75,7 @@ class Piece(NamedTuple):
     Attributes
     ----------
     conn: nodes (ne, na).   dN: Grad N (ne, nq, na, dim).   w, gamma: (ne, nq).   slot: see :class:`.Pattern`.
-    fibres: directions (ne, families, 3).
+    fibres: directions (ne, families, 3).   around: N_a/R (ne, nq, na) of a body of revolution, else (ne, 0, na).
     """
 
     conn: np.ndarray
@@ -83,6 +84,7 @@ class Piece(NamedTuple):
     gamma: np.ndarray
     slot: np.ndarray
     fibres: np.ndarray
+    around: np.ndarray
 
 
 @njit

@@ -2,7 +2,9 @@
 
 With the order of nodes of :mod:`skfsink.fem.facets` the area vector n dA of the edge from x_0 to x_1 is (dy, -dx), and
 that of a face x,s × x,t ds dt. Products of shape functions with it are polynomials, which 2 x 2 Gauss points integrate
-exactly; along a straight motion the area vector is of second order, and two points integrate it exactly as well.
+exactly; along a straight motion the area vector is of second order, and two points integrate it exactly as well. An
+edge of a body of revolution, `revolved`, is a ring: n da is 2 pi r (dy, -dx), of one order more, which two points still
+integrate exactly.
 """
 
 from __future__ import annotations
@@ -24,8 +26,19 @@ DT = np.stack([_s - 1, -_s, 1 - _s, _s], axis=1)
 
 
 @njit(cache=True)
-def add_pressure(facets, p, x, out):  # type: ignore[no-untyped-def]
+def add_pressure(facets, p, x, out, revolved):  # type: ignore[no-untyped-def]
     """out (n, dim) += p int N_a n da over the `facets` (f, k) at the positions `x` (n, dim); `p` (f,) [MPa]."""
+    if revolved:
+        for f in range(facets.shape[0]):
+            a, b = facets[f, 0], facets[f, 1]
+            for s in GAUSS:
+                c = np.pi * p[f] * ((1.0 - s) * x[a, 0] + s * x[b, 0])  # half a way around
+                nx, ny = c * (x[b, 1] - x[a, 1]), -c * (x[b, 0] - x[a, 0])
+                out[a, 0] += (1.0 - s) * nx
+                out[a, 1] += (1.0 - s) * ny
+                out[b, 0] += s * nx
+                out[b, 1] += s * ny
+        return
     if facets.shape[1] == 2:
         for f in range(facets.shape[0]):
             a, b = facets[f, 0], facets[f, 1]
@@ -46,11 +59,24 @@ def add_pressure(facets, p, x, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def swept_volumes(facets, x, dx, weights, out):  # type: ignore[no-untyped-def]
+def swept_volumes(facets, x, dx, weights, out, revolved):  # type: ignore[no-untyped-def]
     """out (f,) = -int w int n . dx da: volume that facets sweep against their normal on the straight way x to x + dx.
 
     The weight w goes linearly from weights[0] to weights[1] on the way; both are 1 for the volume itself.
     """
+    if revolved:
+        for f in range(facets.shape[0]):
+            a, b = facets[f, 0], facets[f, 1]
+            total = 0.0
+            for g in GAUSS:
+                ra, rb = x[a, 0] + g * dx[a, 0], x[b, 0] + g * dx[b, 0]
+                ez = x[b, 1] + g * dx[b, 1] - x[a, 1] - g * dx[a, 1]
+                w = weights[0, f] + g * (weights[1, f] - weights[0, f])
+                for s in GAUSS:
+                    ur, uz = (1.0 - s) * dx[a, 0] + s * dx[b, 0], (1.0 - s) * dx[a, 1] + s * dx[b, 1]
+                    total += 0.5 * np.pi * w * ((1.0 - s) * ra + s * rb) * (ez * ur - (rb - ra) * uz)
+            out[f] = -total
+        return
     if facets.shape[1] == 2:
         for f in range(facets.shape[0]):
             a, b = facets[f, 0], facets[f, 1]
@@ -82,9 +108,25 @@ def swept_volumes(facets, x, dx, weights, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def pressure_tangents(facets, p, x, out):  # type: ignore[no-untyped-def]
+def pressure_tangents(facets, p, x, out, revolved):  # type: ignore[no-untyped-def]
     """out (f, k*dim, k*dim) = derivative of p int N_a n da with the positions of the nodes; not symmetric."""
     out[...] = 0.0
+    if revolved:
+        shape = np.empty(2)
+        for f in range(facets.shape[0]):
+            one, two = facets[f, 0], facets[f, 1]
+            er, ez = x[two, 0] - x[one, 0], x[two, 1] - x[one, 1]
+            for s in GAUSS:
+                shape[0], shape[1] = 1.0 - s, s
+                r = shape[0] * x[one, 0] + shape[1] * x[two, 0]
+                for a in range(2):
+                    c = np.pi * p[f] * shape[a]
+                    for b in range(2):
+                        turn = c * r if b == 1 else -c * r
+                        out[f, 2 * a, 2 * b] += c * shape[b] * ez
+                        out[f, 2 * a, 2 * b + 1] += turn
+                        out[f, 2 * a + 1, 2 * b] -= turn + c * shape[b] * er
+        return
     if facets.shape[1] == 2:
         for f in range(facets.shape[0]):
             for a in range(2):

@@ -8,6 +8,9 @@ b = dJ_bar/du and A_a = dI1'/du, one element gives (Eq. 18, 19 with the J_bar co
     d2I1'/du2 = J^(-2/3) [2 (Grad N_a . Grad N_b) I - 4/3 (n_a g_b^T + g_a n_b^T) + 4/9 trC g_a g_b^T
                           + 2/3 trC g_b g_a^T].
 
+In a body of revolution g_a and n_a have the parts  (cof F)_33/J N_a/R  and  F_33 N_a/R  along r besides, Grad N_a .
+Grad N_b the part  N_a N_b/R^2  in r r, and g_b g_a^T is that of the plane and, in r r, the product of those parts.
+
 It is symmetric and couples all Gauss points of the element through b. A Gauss point with gamma < `SOFT_GAMMA` adds
 `ERSATZ_STIFFNESS` times the stiffness of an undeformed solid, mu int Grad v : Grad u: it keeps nodes that nothing
 holds any more where they are, as the factor 1e-6 on failed elements does in Sec. 4 of the paper. There the factor is
@@ -45,7 +48,7 @@ def tangent(space: Space, pattern: Pattern, material: Material, u: np.ndarray, g
     `elements` it is that of these alone.
     """
     data, x = np.zeros(pattern.nnz), space.X + u
-    loop = _tangent_2d if space.dim == 2 else _tangent_3d
+    loop = _tangent_around if space.axisymmetric else _tangent_2d if space.dim == 2 else _tangent_3d
     solid = Solid(material.bulk_modulus, material.shear_modulus, j_bar, convex)
     for piece in pieces(space, pattern, gamma, elements):
         loop(material.compiled_law.address, material.constants, solid, x, piece, data)
@@ -92,16 +95,23 @@ def _cofactor(F, G):  # type: ignore[no-untyped-def]
     G[2, 2] = F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]
 
 
-def parts(dim: int) -> tuple[Callable[..., Any], ...]:
-    """Parts of the element loops for one dimension: deformation, volumetric coupling, and scatter."""
+def parts(dim: int, revolved: bool = False) -> tuple[Callable[..., Any], ...]:
+    """Parts of the element loops for one dimension: deformation, volumetric coupling, and scatter.
+
+    Those that are `revolved` are of bodies of revolution, dim = 2.
+    """
     na = 2**dim
     nd = na * dim
 
     @njit(**PART)
     def deformation(x, piece, e, q, F):  # type: ignore[no-untyped-def]
-        """F = Grad x at Gauss point q, with F_33 = 1 in a plane."""
+        """F = Grad x at Gauss point q, with F_33 = 1 in a plane, or r/R."""
         F[:] = 0.0
         F[2, 2] = 1.0
+        if revolved:
+            F[2, 2] = 0.0
+            for a in range(na):
+                F[2, 2] += x[piece.conn[e, a], 0] * piece.around[e, q, a]
         for i in range(dim):
             for j in range(dim):
                 s = 0.0
@@ -128,17 +138,21 @@ def parts(dim: int) -> tuple[Callable[..., Any], ...]:
     return deformation, volumetric_coupling, scatter
 
 
-def _make(dim: int) -> Callable[..., Any]:
+def _make(dim: int, revolved: bool = False) -> Callable[..., Any]:
     """The element loop for one dimension, with its sizes as constants so that the compiler unrolls it."""
     na = 2**dim
     nd = na * dim
-    deformation, volumetric_coupling, scatter = parts(dim)
+    deformation, volumetric_coupling, scatter = parts(dim, revolved)
 
     @njit(**PART)
     def products(where, factors, dN, g, Az, K):  # type: ignore[no-untyped-def]
-        """Adds the isochoric and the geometric part of a Gauss point on the upper triangle."""
+        """Adds the isochoric and the geometric part of a Gauss point on the upper triangle.
+
+        The rows na and after of a `g` of a body of revolution are those of the plane alone.
+        """
         e, q = where
         direct, c2, crossed = factors
+        p = na + q if revolved else q
         for a in range(na):
             for bb in range(a, na):
                 s = 0.0
@@ -150,7 +164,7 @@ def _make(dim: int) -> Callable[..., Any]:
                     for k in range(dim):
                         bk = dim * bb + k
                         K[ai, bk] += (c2 * Az[0, ai] * Az[0, bk] + Az[1, ai] * g[q, bk] + g[q, ai] * Az[1, bk]
-                                      + crossed * g[q, dim * a + k] * g[q, dim * bb + i])
+                                      + crossed * g[p, dim * a + k] * g[p, dim * bb + i])
                     K[ai, dim * bb + i] += s
 
     @njit(cache=True, fastmath={"contract", "arcp", "nsz", "reassoc"}, nogil=True)
@@ -159,7 +173,8 @@ def _make(dim: int) -> Callable[..., Any]:
         k_bulk, mu, j_bar, convex = solid.bulk_modulus, solid.shear_modulus, solid.j_bar, solid.convex
         conn, dN, w, gamma, slot = piece.conn, piece.dN, piece.w, piece.gamma, piece.slot
         K, b = np.empty((nd, nd)), np.empty(nd)
-        g, nf, Az = np.empty((na, nd)), np.empty((na, nd)), np.empty((2, nd))
+        g, nf, Az = np.empty((2 * na if revolved else na, nd)), np.empty((na, nd)), np.empty((2, nd))
+        ring = np.empty(na)
         F, G = np.empty((3, 3)), np.empty((3, 3))
         J, tr, I1, R = np.empty(na), np.empty(na), np.empty(na), np.empty(na)
         least = np.empty(na)
@@ -184,7 +199,10 @@ def _make(dim: int) -> Callable[..., Any]:
                     R[q] *= crush_factor(det)
                     floored *= crush_factor(det)  # J_e
                 if convex:  # least product of two stretches that the deformation can turn
-                    least[q] = floored if dim == 2 else floored / np.sqrt(_greatest(F, t))
+                    if revolved:
+                        least[q] = floored / max(F[2, 2], J_FLOOR)
+                    else:
+                        least[q] = floored if dim == 2 else floored / np.sqrt(_greatest(F, t))
                 I1[q] = R[q] * t
                 for a in range(na):
                     for i in range(dim):
@@ -192,9 +210,16 @@ def _make(dim: int) -> Callable[..., Any]:
                         for j in range(dim):
                             s += G[i, j] * dN[e, q, a, j]
                             r += F[i, j] * dN[e, q, a, j]
+                        if revolved:
+                            g[na + q, dim * a + i] = s / floored
+                            if i == 0:
+                                s += G[2, 2] * piece.around[e, q, a]
+                                r += F[2, 2] * piece.around[e, q, a]
                         b[dim * a + i] += w[e, q] * s
                         g[q, dim * a + i] = s / floored
                         nf[q, dim * a + i] = r
+                if revolved:
+                    ring[q] = (G[2, 2] / floored) ** 2
                 V += w[e, q]
                 mean += w[e, q] * det
                 gamma_bar += w[e, q] * gamma[e, q]
@@ -223,10 +248,16 @@ def _make(dim: int) -> Callable[..., Any]:
                     Az[0, i] = R[q] * (2.0 * nf[q, i] - 2.0 / 3.0 * tr[q] * g[q, i])
                     Az[1, i] = straight * g[q, i] - 4.0 / 3.0 * c1 * nf[q, i]
                 products((e, q), (2.0 * c1 + soft, c2, crossed), dN, g, Az, K)
+                if revolved:
+                    around = 2.0 * c1 + soft + crossed * ring[q]
+                    for a in range(na):
+                        for bb in range(a, na):
+                            K[dim * a, dim * bb] += around * piece.around[e, q, a] * piece.around[e, q, bb]
             scatter(K, slot, e, data)
 
     return loop
 
 
 _tangent_2d = _make(2)
+_tangent_around = _make(2, revolved=True)
 _tangent_3d = _make(3)

@@ -74,7 +74,8 @@ class Tiles:
         ne, na, dim = space.n_elements, space.conn.shape[1], space.dim
         self.lanes = LANES if dim == 2 else LANES_3D
         ends = self._arrange([elements for elements, _ in parts])
-        geometry = np.concatenate([space.invJ.reshape(ne, na, dim * dim), space.w[:, :, None]], axis=2)
+        around = [1.0 / (space.X[space.conn, 0] @ space.N.T)[:, :, None]] if space.axisymmetric else []
+        geometry = np.concatenate([space.invJ.reshape(ne, na, dim * dim), space.w[:, :, None], *around], axis=2)
         self.conn = self.tile(space.conn).astype(np.uint32)
         self.geometry = self.tile(geometry.transpose(0, 2, 1).reshape(ne, -1))  # by component, then Gauss point
         self.gamma = np.zeros((self.count, na, self.lanes))

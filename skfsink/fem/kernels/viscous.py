@@ -6,6 +6,7 @@ sum_q P_q Grad N_a  with
     P = s cof F,   s = 2 w gamma eta/J_e [sym l - 1/3 tr(l) 1] + w gamma_bar q 1,
     q = rho0 c_d L [b1 - b2^2 L/c_d min(0, D)] D,   D = dJ_bar/dt = sum_q w tr(l)/V,   L = V^(1/dim).
 
+In a body of revolution F and dF/dt have the components r/R and v_r/R around it, and L is the root of the section.
 A thin sheet is incompressible: d_33 = -tr d, and without stress across it s = 2 w gamma eta/J_e^2 [sym l + tr(l) 1].
 J_e is J, or what takes its place in a crushed point. The power of this force is never negative.
 
@@ -23,6 +24,7 @@ from ...system.jit import njit
 from ..pattern import Pattern
 from ..space import Space
 from . import force2d, force3d
+from .hoop import AROUND, add_hoop_force, hoop_stretch, rate_around, ratio_around, viscous_stress
 from .lanes import FAST, J_FLOOR, LANES, LANES_3D, crush_factor
 from .pieces import pieces
 from .records import Viscous
@@ -42,10 +44,13 @@ def _inverse(J, sheet, inverse):  # type: ignore[no-untyped-def]
 
 
 @njit(fastmath=FAST)
-def _bulk(w, gamma, rate, viscous, dim, sums, q):  # type: ignore[no-untyped-def]
-    """gamma_bar q of each lane, from the rate of J at the points; returns the greatest compression of a live lane."""
+def _bulk(w, around, gamma, rate, viscous, dim, sums, q):  # type: ignore[no-untyped-def]
+    """gamma_bar q of each lane, from the rate of J at the points; returns the greatest compression of a live lane.
+
+    `around` is 1/R of a body of revolution, and empty of others.
+    """
     L = q.size
-    V, mean, D = sums[:L], sums[L:2 * L], sums[2 * L:]
+    V, mean, D, section = sums[:L], sums[L:2 * L], sums[2 * L:3 * L], sums[3 * L:]
     sums[:] = 0.0
     for a in range(w.size // L):
         for i in range(L):
@@ -53,10 +58,16 @@ def _bulk(w, gamma, rate, viscous, dim, sums, q):  # type: ignore[no-untyped-def
             V[i] += w[k]
             mean[i] += w[k] * gamma[k]
             D[i] += w[k] * rate[k]
+    if around.size:
+        for a in range(w.size // L):
+            for i in range(L):
+                section[i] += w[a * L + i] * around[a * L + i] / (2.0 * np.pi)
+    else:
+        section[:] = V
     greatest = 0.0
     for i in range(L):
         D[i] /= V[i]
-        length = V[i] ** (1.0 / dim)
+        length = section[i] ** (1.0 / dim)
         compression = -length / viscous.speed * D[i] if D[i] < 0.0 else 0.0
         q[i] = (mean[i] / V[i] * viscous.impedance * length * D[i]
                 * (viscous.linear + viscous.quadratic**2 * compression))
@@ -108,23 +119,39 @@ def viscous_2d(viscous, x, v, elements):  # type: ignore[no-untyped-def]
     bulk = viscous.linear > 0.0 or viscous.quadratic > 0.0
     F, G = np.empty(force2d.ROWS * LANES), np.empty(force2d.ROWS * LANES)
     z, t, inverse, rate = np.empty(8 * LANES), np.empty(4 * _Q), np.empty(_Q), np.empty(_Q)
-    c, wq, sums, q = np.empty(_Q), np.empty(_Q), np.empty(3 * LANES), np.zeros(LANES)
+    c, wq, sums, q = np.empty(_Q), np.empty(_Q), np.empty(4 * LANES), np.zeros(LANES)
+    J, floored = force2d.points(F, force2d.J_ROW), force2d.points(F, force2d.FLOORED)
+    tr, f = force2d.points(F, force2d.TRACE), force2d.points(F, force2d.HOOP)
+    ratio, hoop, revolved = force2d.points(G, force2d.HOOP), np.empty(_Q), geometry.shape[1] > AROUND
     greatest = 0.0
     for tile in range(conn.shape[0]):
         geo, g = geometry[tile].reshape(-1), gamma[tile].reshape(-1)
-        w = geo[force2d.WEIGHT * LANES:]
+        w, around = geo[force2d.WEIGHT * LANES:(force2d.WEIGHT + 4) * LANES], geo[AROUND * LANES:]
+        out = elements.force[tile].reshape(-1)
         force2d._gather(conn[tile], x, z)
         force2d._kinematics(z, geo, F)
+        if revolved:
+            ratio_around(z, around, f)
+            hoop_stretch(f, J, floored, tr)
         force2d._gather(conn[tile], v, z)
         force2d._kinematics(z, geo, G)
-        _inverse(force2d.points(F, force2d.J_ROW), viscous.sheet, inverse)
+        if revolved:
+            ratio_around(z, around, ratio)
+        _inverse(J, viscous.sheet, inverse)
         if bulk:
             _rate_2d(F, G, rate)
-            found = _bulk(w, g, rate, viscous, 2, sums, q)
+            if revolved:
+                rate_around(F, f, ratio, rate)
+            found = _bulk(w, around, g, rate, viscous, 2, sums, q)
             greatest = found if found > greatest else greatest
         _factors(w, g, inverse, viscous.eta, q, c, wq)
-        _stress_2d(F, G, geo, c, side, wq, t)
-        force2d._nodal_force(t, elements.force[tile].reshape(-1))
+        if revolved:
+            viscous_stress(F, G, f, ratio, geo, c, wq, t, hoop)
+        else:
+            _stress_2d(F, G, geo, c, side, wq, t)
+        force2d._nodal_force(t, out)
+        if revolved:
+            add_hoop_force(hoop, out)
     return greatest
 
 
@@ -183,7 +210,7 @@ def viscous_3d(viscous, x, v, elements):  # type: ignore[no-untyped-def]
     z, t, l = np.empty(24 * L), np.empty(3 * Q), np.empty(6 * Q)
     F, G, C, P = np.empty(9 * Q), np.empty(9 * Q), np.empty(9 * Q), np.empty(9 * Q)
     J, floored, tr, inverse, rate = np.empty(Q), np.empty(Q), np.empty(Q), np.empty(Q), np.empty(Q)
-    c, wq, sums, q = np.empty(Q), np.empty(Q), np.empty(3 * L), np.zeros(L)
+    c, wq, sums, q = np.empty(Q), np.empty(Q), np.empty(4 * L), np.zeros(L)
     greatest = 0.0
     for tile in range(conn.shape[0]):
         geo, g = geometry[tile].reshape(-1), gamma[tile].reshape(-1)
@@ -195,7 +222,7 @@ def viscous_3d(viscous, x, v, elements):  # type: ignore[no-untyped-def]
         _cofactors(F, C)
         _turned(C, G, l, rate)
         if bulk:
-            found = _bulk(w, g, rate, viscous, 3, sums, q)
+            found = _bulk(w, w[:0], g, rate, viscous, 3, sums, q)
             greatest = found if found > greatest else greatest
         _factors(w, g, inverse, viscous.eta, q, c, wq)
         _piola_3d(C, l, rate, c, wq, P)
@@ -215,28 +242,30 @@ def viscous_tangent(space: Space, pattern: Pattern, viscous: Viscous, motion: tu
     by -L/c_d min(0, D) = `compression` at least. With `elements` it is that of these alone.
     """
     u, v = motion
-    data, loop = np.zeros(pattern.nnz), _tangent_2d if space.dim == 2 else _tangent_3d
+    data = np.zeros(pattern.nnz)
+    loop = _tangent_around if space.axisymmetric else _tangent_2d if space.dim == 2 else _tangent_3d
     for piece in pieces(space, pattern, gamma, elements):
         loop(viscous, compression, (space.X + u, v), piece, data)
     return data
 
 
-def _make(dim: int) -> Callable[..., Any]:
+def _make(dim: int, revolved: bool = False) -> Callable[..., Any]:
     """The element loop for one dimension."""
     na = 2**dim
     nd = na * dim
-    deformation, coupling, scatter = parts(dim)
+    deformation, coupling, scatter = parts(dim, revolved)
 
     @njit(cache=True, fastmath={"contract", "arcp", "nsz", "reassoc"}, nogil=True)
     def loop(viscous, compression, motion, piece, data):  # type: ignore[no-untyped-def]
         x, v = motion
         side = 1.0 if viscous.sheet else -1.0 / 3.0
         conn, dN, w, gamma, slot = piece.conn, piece.dN, piece.w, piece.gamma, piece.slot
-        K, b, g, factor = np.empty((nd, nd)), np.empty(nd), np.empty((na, nd)), np.empty(na)
+        K, b, factor = np.empty((nd, nd)), np.empty(nd), np.empty(na)
+        g, turn, ring = np.empty((na, nd)), np.empty((na, nd)), np.empty(na)  # turn: of g what is in the plane
         F, C = np.empty((3, 3)), np.empty((3, 3))
         for e in range(conn.shape[0]):
             b[:] = 0.0
-            V, gamma_bar, D = 0.0, 0.0, 0.0
+            V, gamma_bar, D, extent = 0.0, 0.0, 0.0, 0.0
             for q in range(na):
                 deformation(x, piece, e, q, F)
                 _cofactor(F, C)
@@ -248,14 +277,21 @@ def _make(dim: int) -> Callable[..., Any]:
                         s = 0.0
                         for j in range(dim):
                             s += C[i, j] * dN[e, q, a, j]
+                        turn[q, dim * a + i] = s / J_e
+                        if revolved and i == 0:
+                            s += C[2, 2] * piece.around[e, q, a]
                         b[dim * a + i] += w[e, q] * s
                         g[q, dim * a + i] = s / J_e
+                if revolved:
+                    ring[q] = (C[2, 2] / J_e) ** 2
+                    for a in range(na):
+                        extent += w[e, q] * piece.around[e, q, a] / (2.0 * np.pi)
                 V += w[e, q]
                 gamma_bar += w[e, q] * gamma[e, q]
             for a in range(na):
                 for i in range(dim):
                     D += b[dim * a + i] * v[conn[e, a], i]
-            length = V ** (1.0 / dim)
+            length = (extent if revolved else V) ** (1.0 / dim)
             counted = max(compression, -length / viscous.speed * D / V)
             slope = viscous.impedance * length * (viscous.linear + 2.0 * viscous.quadratic**2 * counted)
             coupling(gamma_bar / V * slope / V, b, K)
@@ -264,17 +300,21 @@ def _make(dim: int) -> Callable[..., Any]:
                     for bb in range(a, na):
                         s = 0.0
                         for j in range(dim):
-                            s += g[q, dim * a + j] * g[q, dim * bb + j]
+                            s += turn[q, dim * a + j] * turn[q, dim * bb + j]
                         for i in range(dim):
                             for k in range(dim):
                                 K[dim * a + i, dim * bb + k] += factor[q] * (
-                                    0.5 * g[q, dim * a + k] * g[q, dim * bb + i]
+                                    0.5 * turn[q, dim * a + k] * turn[q, dim * bb + i]
                                     + side * g[q, dim * a + i] * g[q, dim * bb + k])
                             K[dim * a + i, dim * bb + i] += factor[q] * 0.5 * s
+                        if revolved:
+                            K[dim * a, dim * bb] += (factor[q] * ring[q] * piece.around[e, q, a]
+                                                     * piece.around[e, q, bb])
             scatter(K, slot, e, data)
 
     return loop
 
 
 _tangent_2d = _make(2)
+_tangent_around = _make(2, revolved=True)
 _tangent_3d = _make(3)

@@ -11,6 +11,7 @@ import numpy as np
 
 from ...system.jit import njit
 from . import force2d, force3d
+from .hoop import AROUND, add_hoop_force, hoop_stress, ratio_around
 from .lanes import FAST, LANES, LANES_3D
 
 __all__ = ["volumetric_2d", "volumetric_3d"]
@@ -44,14 +45,20 @@ def volumetric_2d(x, elements, inverse_mass):  # type: ignore[no-untyped-def]
     Q = 4 * LANES
     z, ws, t = np.empty(8 * LANES), np.empty(force2d.ROWS * LANES), np.empty(4 * Q)
     ab, b, sums = np.zeros(2 * Q), np.empty(8 * LANES), np.empty(3 * LANES)
+    f, hoop, revolved = force2d.points(ws, force2d.HOOP), np.empty(Q), geometry.shape[1] > AROUND
     greatest = 0.0
     for tile in range(conn.shape[0]):
         geo, w = geometry[tile].reshape(-1), geometry[tile].reshape(-1)[force2d.WEIGHT * LANES:]
-        ab[Q:] = w
+        ab[Q:] = w[:Q]
         force2d._gather(conn[tile], x, z)
         force2d._kinematics(z, geo, ws)
+        if revolved:
+            ratio_around(z, geo[AROUND * LANES:], f)
+            hoop_stress(ws, f, geo[AROUND * LANES:], ab, hoop)
         force2d._stress(ws, geo, ab, t)
         force2d._nodal_force(t, b)
+        if revolved:
+            add_hoop_force(hoop, b)
         found = _greatest(conn[tile], b, inverse_mass, w, gamma[tile].reshape(-1), sums)
         greatest = found if found > greatest else greatest
     return greatest

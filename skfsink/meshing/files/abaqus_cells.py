@@ -9,7 +9,7 @@ from .abaqus_lines import listed
 from .abaqus_named import Named
 from .abaqus_parts import Elements
 from .abaqus_sets import Body, Placed, base_of
-from .abaqus_types import PLANE_STRESS, SHELL
+from .abaqus_types import PLANE_STRESS, REVOLVED, SHELL
 from .unreadable import Unreadable
 
 __all__ = ["Cells"]
@@ -163,6 +163,9 @@ class Cells:
         if stress := [kind for kind in kinds if PLANE_STRESS.match(kind)]:
             self.notes.append(f"the elements are of plane stress ({listed(stress)}): a deck decides, with "
                               'element = "planestress"')
+        if around := [kind for kind in kinds if REVOLVED.match(kind)]:
+            self.notes.append(f"the elements are of a body of revolution ({listed(around)}): a deck decides, with "
+                              'element = "axisymmetric"')
         if shells := [kind for kind in kinds if SHELL.match(kind)]:
             self.notes.append(f"shells and membranes ({listed(shells)}) are taken as plane elements, whose thickness "
                               "and plane stress or strain a deck decides")

@@ -136,9 +136,9 @@ class Part:
         user = self.users.get(kind)
         cell = cell_of(kind) if user is None else ""
         shown = kind[:20] if kind.isprintable() else ascii(kind[:20])
-        if user is None and AXISYMMETRIC.match(kind):
-            raise block.error(f"elements {shown} are axisymmetric, which is not computed: make a plane mesh, or one of "
-                              "hexahedra of the whole body")
+        if cell is None and AXISYMMETRIC.match(kind):
+            raise block.error(f"elements {shown} are axisymmetric of a kind that is not computed: make a mesh of solid "
+                              "ones (CAX4), or one of hexahedra of the whole body")
         for form, reason in REFUSED if user is None else ():
             if form.match(kind):
                 raise block.error(f"elements {shown} are {reason}")

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import re
 
-__all__ = ["AXISYMMETRIC", "FACES", "ORDER", "PLANE_STRESS", "REFUSED", "SHELL", "SIZE", "cell_of"]
+__all__ = ["AXISYMMETRIC", "FACES", "ORDER", "PLANE_STRESS", "REFUSED", "REVOLVED", "SHELL", "SIZE", "cell_of"]
 
 #: cell, and the form of the types of it
 CELLS = (
-    ("quad", r"(CPE|CPS|CPEG|CGPE|M3D|DC2D|AC2D)4[A-Z]*|S4(R5|RSW|RS|RT?|T)?|DS4|SFM3D4R?"),
-    ("quad8", r"(CPE|CPS|CPEG|CGPE|M3D|DC2D|AC2D)8[A-Z]*|S8R(5|T)?|DS8|SFM3D8R?"),
+    ("quad", r"(CPE|CPS|CPEG|CGPE|CAX|M3D|DC2D|AC2D)4[A-Z]*|S4(R5|RSW|RS|RT?|T)?|DS4|SFM3D4R?"),
+    ("quad8", r"(CPE|CPS|CPEG|CGPE|CAX|M3D|DC2D|AC2D)8[A-Z]*|S8R(5|T)?|DS8|SFM3D8R?"),
     ("quad9", r"M3D9R?|S9R5"),
-    ("triangle", r"(CPE|CPS|CPEG|CGPE|M3D|DC2D|AC2D)3[A-Z]*|S3(RS|RT?|T)?|STRI3|DS3|SFM3D3"),
-    ("triangle6", r"(CPE|CPS|CPEG|CGPE|M3D|DC2D|AC2D)6[A-Z]*|STRI65|DS6|SFM3D6"),
+    ("triangle", r"(CPE|CPS|CPEG|CGPE|CAX|M3D|DC2D|AC2D)3[A-Z]*|S3(RS|RT?|T)?|STRI3|DS3|SFM3D3"),
+    ("triangle6", r"(CPE|CPS|CPEG|CGPE|CAX|M3D|DC2D|AC2D)6[A-Z]*|STRI65|DS6|SFM3D6"),
     ("hexahedron", r"(C3D|DC3D|AC3D)8[A-Z]*|SC8RT?|CSS8|DCC3D8D?"),
     ("hexahedron20", r"(C3D|DC3D|AC3D)20[A-Z]*"),
     ("hexahedron27", r"C3D27[A-Z]*"),
@@ -23,6 +23,7 @@ CELLS = (
     ("pyramid", r"(C3D|AC3D)5[A-Z]*"),
 )
 PLANE_STRESS = re.compile(r"CPS\d")
+REVOLVED = re.compile(r"CAX\d")
 SHELL = re.compile(r"S\d|STRI|M3D|SFM3D|DS\d")
 AXISYMMETRIC = re.compile(r"(CAX|CGAX|SAX|MAX|MGAX|SFMAX|SFMGAX|DCAX|DCCAX|ACAX|DSAX|SAXA|CAXA|COHAX|RAX|GKAX|"
                           r"CINAX|ACINAX|WARP)")

@@ -69,8 +69,8 @@ def read_nastran(path: Path) -> meshio.Mesh:
             elif card.startswith("INCLUDE"):
                 raise Unreadable(f"line {number}: it names another file; put all into one")
             elif card.startswith(ROUND):
-                raise Unreadable(f"line {number}: it has elements {card} of a body of revolution, which cannot be "
-                                 "computed; mesh the body in space, or as a plane one")
+                raise Unreadable(f"line {number}: it has elements {card} of a body of revolution, which are not "
+                                 "read; write its half plane in x and y as CQUAD4, and take element axisymmetric")
             elif card[0] in "CR" and not card.startswith(PLAIN):
                 left_out[card] += 1
         except Unreadable:

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from ...fem.space import Space
 from ...fields.body import Body
-from ...fields.pieces import pieces_of
+from ...fields.pieces import Pieces, pieces_of
 from ...fields.state import State
 from ...results.fragments import FRAGMENTS, append_fragments, fragment_columns, write_fragments
 from .observer import Recorder
@@ -17,11 +18,10 @@ from .view import View
 __all__ = ["Fragments", "fragment_summary"]
 
 
-def _rows(body: Body, state: State) -> np.ndarray:
+def _rows(found: Pieces) -> np.ndarray:
     """A row for each piece, the heaviest first: the columns of :func:`.fragment_columns`."""
-    found = pieces_of(body.momentum, state)
     return np.column_stack([np.arange(1, len(found.mass) + 1), *(
-        part if part.ndim == 2 else part[:, None] for part in found)])
+        part if part.ndim == 2 else part[:, None] for part in found[:-1])])
 
 
 class Fragments(Recorder):
@@ -46,7 +46,7 @@ class Fragments(Recorder):
 
     def prepare(self, view: View) -> None:
         """Begin the file with the rows so far."""
-        write_fragments(view.folder / FRAGMENTS, view.body.space.dim, self.rows)
+        write_fragments(view.folder / FRAGMENTS, _columns(view.body.space), self.rows)
 
     def due(self, view: View) -> bool:
         """When it is time, if it looks at all before the end."""
@@ -63,17 +63,22 @@ class Fragments(Recorder):
         self._add(view, view.state.time)
 
     def _add(self, view: View, time: float) -> None:
-        found = _rows(view.body, view.state)
+        found = _rows(pieces_of(view.body.momentum, view.state))
         rows = np.column_stack([np.tile([float(view.state.step), time], (len(found), 1)), found])
         self._rows.append(rows)
-        append_fragments(view.folder / FRAGMENTS, view.body.space.dim, rows)
+        append_fragments(view.folder / FRAGMENTS, _columns(view.body.space), rows)
+
+
+def _columns(space: Space) -> list[str]:
+    return fragment_columns(space.dim, space.volume_dim)
 
 
 def fragment_summary(body: Body, state: State, length_scale: float) -> Mapping[str, Any]:
     """The pieces of a body, as `summary.json` has them: each that is no debris, and sums of the debris and of all."""
-    rows, names = _rows(body, state), fragment_columns(body.space.dim)
+    found, names = pieces_of(body.momentum, state), _columns(body.space)
+    rows = _rows(found)
     whole = {"piece", "elements"}
-    is_debris = rows[:, 2] < length_scale**body.space.dim
+    is_debris = found.extent < length_scale**body.space.dim
     added = [name for name in names if name.startswith(("elements", "area", "volume", "mass", "momentum", "kinetic"))]
 
     def sums(of: np.ndarray) -> dict[str, Any]:

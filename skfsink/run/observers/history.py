@@ -112,7 +112,7 @@ class History(Observer):
         without = terms_without(view.body.momentum, not view.quasistatic)
         if view.body.loading.followers is None:
             without += OF_PRESSURES
-        self._table = Rows(view.folder / "history.csv", self._kept, view.body.space.dim, without)
+        self._table = Rows(view.folder / "history.csv", self._kept, view.body.space.volume_dim, without)
 
     def loading(self, view: View) -> None:
         """The row of a load increment."""

@@ -37,7 +37,7 @@ NOTCHES = ("notch", "crack", "slit", "hole", "cut", "flaw")  # words in names of
 def _outer(scene: Scene) -> np.ndarray:
     """Mask (n,) of the nodes of the surface."""
     mask = np.zeros(scene.sample.space.n_nodes, bool)
-    mask[scene.sample.space.mesh.boundary_nodes()] = True
+    mask[scene.sample.rim()] = True
     return mask
 
 
@@ -62,8 +62,13 @@ def _stands(value: float | Ramp | None) -> bool:
 
 
 def symmetry_planes(scene: Scene) -> list[tuple[str, Plane]]:
-    """The planes of symmetry, by their names; without those that are `faces`, along which cracks run anyway."""
+    """The planes of symmetry, by their names; without those that are `faces`, along which cracks run anyway.
+
+    The axis of revolution, "", is one of the half plane.
+    """
     found: list[tuple[str, Plane]] = []
+    if (axis_nodes := np.flatnonzero(scene.space.on_axis)).size:
+        found.append(("", Plane(0, axis_nodes)))
     outer, grips = _outer(scene), (*scene.grips, *scene.rollers)
     for name, held in _held(scene, grips):
         axis, nodes = _normal(scene, name), scene.sample.nodes(name)
@@ -81,7 +86,7 @@ def symmetry_planes(scene: Scene) -> list[tuple[str, Plane]]:
 def rim_of(scene: Scene) -> tuple[np.ndarray, list[Plane]]:
     """Nodes of the rim that a crack arrives at, and the planes of symmetry, which are no part of it."""
     planes = symmetry_planes(scene)
-    return scene.sample.rim(*scene.faces, *(name for name, _ in planes)), [plane for _, plane in planes]
+    return scene.sample.rim(*scene.faces, *(name for name, _ in planes if name)), [plane for _, plane in planes]
 
 
 def clamps(scene: Scene) -> list[str]:

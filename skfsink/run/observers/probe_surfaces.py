@@ -43,8 +43,8 @@ class ReactionProbe(Probe):
         if not names:
             raise ParameterError("the scene has no grips: name the boundary whose force is to be followed")
         self._nodes = [scene.sample.nodes(boundary) for boundary in names]
-        dim = scene.space.dim
-        return [(f"{boundary}_{axis}", "N" if dim == 3 else "N/mm") for boundary in names for axis in _AXES[:dim]]
+        unit = "N" if scene.space.volume_dim == 3 else "N/mm"
+        return [(f"{boundary}_{axis}", unit) for boundary in names for axis in _AXES[:scene.space.dim]]
 
     def _values(self, view: View) -> np.ndarray:
         return np.concatenate([view.reaction[nodes].sum(axis=0) for nodes in self._nodes])
@@ -55,8 +55,9 @@ class VolumeProbe(Probe):
 
     The rims of an open boundary are closed by flat caps: they have to be in planes, and a boundary in the plane has to
     be one line. With a `position` straight lines from the rims to that point close it: the middle of a cavity of which
-    planes of symmetry through that point leave a part. Once an element at the boundary has failed there is no such
-    volume, and NaN is written.
+    planes of symmetry through that point leave a part. Of a body of revolution it is the volume within the rings,
+    closed by disks normal to the axis, or by cones to a point on it. Once an element at the boundary has failed there
+    is no such volume, and NaN is written.
 
     Parameters
     ----------
@@ -77,10 +78,10 @@ class VolumeProbe(Probe):
         if self._apex is None:
             self._surface.check_caps()
         before, size = self._surface.volume(space.X, self._apex), float(np.ptp(space.X, axis=0).max())
-        if abs(before) < 1e-12 * size**space.dim and (self._apex is not None or self._surface.rims()):
+        if abs(before) < 1e-12 * size**space.volume_dim and (self._apex is not None or self._surface.rims()):
             raise ParameterError(f"the boundary {self.boundary!r} is flat, and encloses nothing")
         self._sign = 1.0 if before > 0.0 else -1.0  # a closed slit has none; it is a cavity
-        return [("volume", "mm^3") if space.dim == 3 else ("area", "mm^2")]
+        return [("volume", "mm^3") if space.volume_dim == 3 else ("area", "mm^2")]
 
     def _values(self, view: View) -> np.ndarray:
         if view.state.deleted[self._surface.elements].any():

@@ -55,7 +55,7 @@ class Progress(Observer):
 
 def _unit(view: View) -> str:
     """Of the load."""
-    return history_units(view.body.space.dim)["reaction_N_per_mm"]
+    return history_units(view.body.space.volume_dim)["reaction_N_per_mm"]
 
 
 class Checkpoint(Observer):

@@ -11,6 +11,7 @@ import numpy as np
 
 from ...errors import place_text
 from ...fem import indicators
+from ...fem.elements import ELEMENTS
 from ...fem.space import Space
 from ...fields.state import State
 from ...material.regions import Region
@@ -81,7 +82,7 @@ def check_onset(scene: Scene, state: State) -> None:
 
 def check_pressure(scene: Scene, state: State) -> None:
     """Pressures that alternate, in each material for itself, since they jump between two; not of failed elements."""
-    if scene.controls.element != "jbar":
+    if not ELEMENTS[scene.controls.element].j_bar:
         return
     space = scene.sample.space
     for part in scene.parts:
