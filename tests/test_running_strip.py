@@ -13,8 +13,9 @@ from skfsink.fields.body import Body
 from skfsink.fields.release_rate import energy_release_rate
 from skfsink.material import AAA, NeoHookean
 from skfsink.material.base import rayleigh_speed
-from skfsink.study import validation_running
+from skfsink.study import validation_running, validation_supershear
 from skfsink.study.running_strip import BURST, PIECE, RunningStrip, pieces, sheet_speed
+from skfsink.study.validation_supershear import COARSE, SERIES, crossing, strip_at
 
 SHORT = RunningStrip(1.0, 1.2, 0.6, fine=2.0, aside=2.0, layer=0.75)
 
@@ -90,6 +91,24 @@ def test_pieces_of_a_way() -> None:
     assert pieces(track(20.0, 0.3, 0.8)) == []
 
 
+def test_where_a_speed_is_passed() -> None:
+    """Fails if the stretch is not interpolated, one that stopped counts, or a fast series is said to pass."""
+    at = np.array([1.0, 1.1, 1.2, 1.3])
+    assert crossing(at, np.array([0.8, 0.9, 1.1, 1.2]), 1.0) == pytest.approx(1.15)
+    assert crossing(at, np.array([0.8, np.nan, 1.1, 1.2]), 1.0) == pytest.approx(1.0 + 0.2 * 2 / 3)
+    assert np.isnan(crossing(at, np.array([1.05, 1.1, 1.1, 1.2]), 1.0))
+    assert np.isnan(crossing(at, np.array([0.5, 0.6, 0.7, 0.8]), 1.0))
+
+
+def test_control_has_the_same_energy_at_a_small_strain() -> None:
+    """Fails if the control of a stretched strip has another W H over psi_f l, or is stretched by more than 1 %."""
+    strip, control = strip_at(1.2, SERIES["neo-Hookean"]), strip_at(1.2, SERIES["control"])
+    assert strip.stretch == pytest.approx(1.2, rel=1e-9)
+    assert control.energy == pytest.approx(strip.energy, rel=1e-12)
+    assert control.stretch - 1 < 0.01
+    assert strip.speeds()["c_s_ahead"] == pytest.approx(strip.material.shear_wave_speed, rel=2e-3)
+
+
 def test_what_the_study_says_of_running_cracks(tmp_path: Path) -> None:
     """Fails if branches at twice Gamma, one Gamma, or Freund's relation are not said to agree when they do, or are."""
     gamma = 0.25
@@ -110,7 +129,23 @@ def test_what_the_study_says_of_running_cracks(tmp_path: Path) -> None:
     validation_running.draw_running(good | bad, tmp_path / "running.png")
 
 
-@pytest.mark.parametrize("plan", [validation_running.plan_running])
+def test_what_the_study_says_of_fast_cracks(tmp_path: Path) -> None:
+    """Fails if a series is said to agree that outruns c_s no more than the control does, or not at all, or a control
+    above c_R."""
+    def points(stretched: float, control: float) -> dict[str, Any]:
+        return {f"{name}/{stretch:g}/{COARSE:g}": track(speed, 0.3, 6.0, energy_over_band=10 * (stretch - 1))
+                for name, fast in (("neo-Hookean", stretched), ("control", control))
+                for stretch, speed in ((1.1, 26.0), (1.2, fast))}
+
+    for stretched, control, expected in ((34.0, 27.0, [True, True]), (34.0, 31.0, [False, False]),
+                                         (29.0, 27.0, [False, True])):
+        rows = validation_supershear.rows_supershear(points(stretched, control))
+        assert [row.agrees for row in rows] == expected
+        assert rows[0].here == ("1.150" if stretched > 30.0 else "none up to 1.2")
+    validation_supershear.draw_supershear(points(34.0, 27.0), tmp_path / "fast.png")
+
+
+@pytest.mark.parametrize("plan", [validation_running.plan_running, validation_supershear.plan_supershear])
 def test_plans(plan: Any) -> None:
     """Fails if two strips of a study are called alike, or its quick version is no part of it."""
     keys = [planned.key for planned in plan(False)]
