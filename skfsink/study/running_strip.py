@@ -34,7 +34,7 @@ from ..scene.controls import Controls
 from ..scene.scene import Scene
 from .plate import PULLED, SPEED, first_passages
 
-__all__ = ["BURST", "PIECE", "RunningStrip", "Stretch", "pieces", "sheet_speed"]
+__all__ = ["BURST", "PIECE", "RunningStrip", "WayPiece", "pieces", "sheet_speed"]
 
 STARTED = 10.0     # length of the crack in front of the cut, in l
 ENDS = 1.5         # heights behind the tip and beyond the run that are kept from the ends
@@ -255,7 +255,7 @@ def guard(state: State) -> None:
 
 
 
-class Stretch(NamedTuple):
+class WayPiece(NamedTuple):
     """A piece of the way of a crack: where it ends [mm], speed [m/s], D and U per length over psi_f l.
 
     U per length over psi_f l is the width of what has failed, in l.
@@ -267,7 +267,7 @@ class Stretch(NamedTuple):
     width: float
 
 
-def pieces(point: dict[str, Any]) -> list[Stretch]:
+def pieces(point: dict[str, Any]) -> list[WayPiece]:
     """The way of a crack cut into pieces of :data:`PIECE` l, from past the first burst to its end or first branch."""
     way, time, taken, failed = (np.array(point[name]) for name in ("tip_mm", "time_us", "taken_N", "failed_N"))
     l, end = point["l_mm"], way[-1] if point["branched_mm"] is None else point["branched_mm"]
@@ -277,4 +277,4 @@ def pieces(point: dict[str, Any]) -> list[Stretch]:
     passed = first_passages(time, way, marks)
     D, U = (np.diff(np.interp(passed, time, of)) / (PIECE * l * point["band_N_per_mm"]) for of in (taken, failed))
     speed = PIECE * l / np.maximum(np.diff(passed), 1e-9) * 1e3
-    return [Stretch(*row) for row in zip(marks[1:].tolist(), speed.tolist(), D.tolist(), U.tolist())]
+    return [WayPiece(*row) for row in zip(marks[1:].tolist(), speed.tolist(), D.tolist(), U.tolist())]

@@ -19,7 +19,7 @@ from ..material import AAA
 from .chart import page
 from .part import Planned, Points
 from .plate import first_passages
-from .running_strip import PIECE, RunningStrip, Stretch, pieces
+from .running_strip import PIECE, RunningStrip, WayPiece, pieces
 from .validation_table import Row
 
 __all__ = ["draw_running", "plan_running", "rows_running"]
@@ -77,7 +77,7 @@ def mean_speed(point: dict[str, Any]) -> float:
     return float(len(way) / sum(1 / piece.speed for piece in way) / point["c_R"]) if way else float("nan")
 
 
-def all_pieces(groups: dict[float, dict[float, dict[str, Any]]]) -> list[tuple[float, Stretch, dict[str, Any]]]:
+def all_pieces(groups: dict[float, dict[float, dict[str, Any]]]) -> list[tuple[float, WayPiece, dict[str, Any]]]:
     """Height, piece and point of all pieces."""
     return [(height, piece, point) for height, group in groups.items() for point in group.values()
             for piece in pieces(point)]
@@ -101,7 +101,7 @@ def before_branches(groups: dict[float, dict[float, dict[str, Any]]]) -> list[fl
             if point["branched_mm"] is not None and pieces(point)]
 
 
-def early(point: dict[str, Any]) -> list[Stretch]:
+def early(point: dict[str, Any]) -> list[WayPiece]:
     """Pieces of the way before waves from the tip can have come back from the grips."""
     back = point["height_mm"] / point["c_d"] * 1e3  # us
     x, t = np.array(point["tip_mm"]), np.array(point["time_us"])

@@ -1,10 +1,10 @@
 """Cracks in stretched neo-Hookean sheets, faster than shear waves, and the same strips of a solid that stays linear.
 
 Experiments on neo-Hookean gels (Wang, Shi, Fineberg, Science 381 (2023) 415-419) and simulations (Pundir, Adda-Bedia,
-Kammer, Phys. Rev. Lett. 132 (2024) 226102, arXiv 2308.09315) find tensile cracks faster than c_R and c_s above a
-critical stretch, because of large deformations alone. Here a crack runs in a thin strip along a weak layer, which
+Kammer, arXiv 2308.09315) find tensile cracks faster than c_R and c_s above a critical stretch, because of large
+deformations alone; their stretches and parameters were not at hand. Here a crack runs in a thin strip along a weak layer, which
 keeps it from branching; the law is neo-Hookean, so that c_s along the strip does not depend on the stretch. The
-control has the same W H over psi_f l, but a limiter so low that it fails at strains of a thousandth or two.
+control has the same W H over psi_f l, but a limiter so low that it fails at strains of half a per cent.
 """
 
 from __future__ import annotations
