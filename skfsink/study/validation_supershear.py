@@ -2,9 +2,9 @@
 
 Experiments on neo-Hookean gels (Wang, Shi, Fineberg, Science 381 (2023) 415-419) and simulations (Pundir, Adda-Bedia,
 Kammer, arXiv 2308.09315) find tensile cracks faster than c_R and c_s above a critical stretch, because of large
-deformations alone; their stretches and parameters were not at hand. Here a crack runs in a thin strip along a weak layer, which
-keeps it from branching; the law is neo-Hookean, so that c_s along the strip does not depend on the stretch. The
-control has the same W H over psi_f l, but a limiter so low that it fails at strains of half a per cent.
+deformations alone; their stretches and parameters were not at hand. Here a crack runs in a thin strip along a weak
+layer, which keeps it from branching; the law is neo-Hookean, so that c_s along the strip does not depend on the
+stretch. The control has the same W H over psi_f l, but a limiter so low that it fails at strains of half a per cent.
 """
 
 from __future__ import annotations
