@@ -142,10 +142,18 @@ class Material:
 
     @property
     def rayleigh_wave_speed(self) -> float:
-        """Root c_R of (2 - c^2/c_s^2)^2 = 4 sqrt(1 - c^2/c_d^2) sqrt(1 - c^2/c_s^2) [m/s]."""
-        ratio2 = (self.shear_wave_speed / self.dilatational_wave_speed) ** 2
+        """c_R, of a half-space (in plane strain) [m/s]; see :func:`rayleigh_speed`."""
+        return rayleigh_speed(self.shear_wave_speed, self.dilatational_wave_speed)
 
-        def rayleigh(s: float) -> float:  # s = (c/c_s)^2; the trivial root s = 0 is left out of the bracket
-            return (2 - s) ** 2 - 4 * np.sqrt((1 - s * ratio2) * (1 - s))
 
-        return self.shear_wave_speed * float(np.sqrt(brentq(rayleigh, 0.1, 1 - 1e-12, xtol=1e-14)))
+def rayleigh_speed(shear: float, longitudinal: float) -> float:
+    """Root c_R of (2 - c^2/c_s^2)^2 = 4 sqrt(1 - c^2/c_d^2) sqrt(1 - c^2/c_s^2), of two speeds of waves.
+
+    Of a thin sheet the `longitudinal` one is that of the sheet.
+    """
+    ratio2 = (shear / longitudinal) ** 2
+
+    def rayleigh(s: float) -> float:  # s = (c/c_s)^2; the trivial root s = 0 is left out of the bracket
+        return (2 - s) ** 2 - 4 * np.sqrt((1 - s * ratio2) * (1 - s))
+
+    return shear * float(np.sqrt(brentq(rayleigh, 0.1, 1 - 1e-12, xtol=1e-14)))

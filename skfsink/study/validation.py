@@ -1,8 +1,9 @@
 """Held against what is known: `python -m skfsink.study.validation`.
 
-Pulses against the acoustic tensor, one tearing energy in different test pieces, and cavitation against closed forms and
-published values. It writes `validation.json`, a picture a part and the one table, which `--page docs/validation.md`
-puts into the documentation; it goes on where it was stopped, and needs gmsh.
+Pulses against the acoustic tensor, one tearing energy in different test pieces, cavitation against closed forms and
+published values, and cracks that run along strips: what they take, where they branch, and when they outrun shear
+waves. It writes `validation.json`, a picture a part and the one table, which `--page docs/validation.md` puts into the
+documentation; it goes on where it was stopped, and needs gmsh.
 """
 
 # ruff: noqa: E402
@@ -27,6 +28,8 @@ from .speed_accuracy import run_parts
 from .store import Store
 from .validation_cavitation import draw_cavitation, plan_cavitation, rows_cavitation
 from .validation_pulses import draw_pulses, plan_pulses, rows_pulses
+from .validation_running import draw_running, plan_running, rows_running
+from .validation_supershear import draw_supershear, plan_supershear, rows_supershear
 from .validation_table import Row, lines, renew
 from .validation_tearing import draw_tearing, plan_tearing, rows_tearing
 
@@ -47,7 +50,9 @@ class Known(NamedTuple):
 
 KNOWN = {"pulses": Known(plan_pulses, draw_pulses, rows_pulses),
          "tearing": Known(plan_tearing, draw_tearing, rows_tearing),
-         "cavitation": Known(plan_cavitation, draw_cavitation, rows_cavitation)}
+         "cavitation": Known(plan_cavitation, draw_cavitation, rows_cavitation),
+         "running": Known(plan_running, draw_running, rows_running),
+         "supershear": Known(plan_supershear, draw_supershear, rows_supershear)}
 FLAG = Parameter(negative="", show_default=False)
 
 
@@ -57,7 +62,7 @@ def rows_of(points: Points) -> list[Row]:
         {key.partition("/")[2]: point for key, point in points.items() if key.startswith(f"{name}/")})]
 
 
-def validation(*, only: Literal["pulses", "tearing", "cavitation"] | None = None,
+def validation(*, only: Literal["pulses", "tearing", "cavitation", "running", "supershear"] | None = None,
                quick: Annotated[bool, FLAG] = False, fresh: Annotated[bool, FLAG] = False,
                out: Path = Path("results/study/validation"), page: Path | None = None,
                quiet: Annotated[bool, FLAG] = False) -> None:
@@ -68,7 +73,7 @@ def validation(*, only: Literal["pulses", "tearing", "cavitation"] | None = None
     only
         One part.
     quick
-        One mesh of each body, in two minutes.
+        One mesh of each body, in three minutes.
     fresh
         Compute all points anew; without it, those in the folder are kept.
     out
