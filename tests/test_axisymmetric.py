@@ -256,6 +256,9 @@ def test_a_translation_along_the_axis_has_no_force() -> None:
     for grips, expected in (((), [("move", True)]), ([(side, Grip("side", (0.0, None)))], [("move", True)]),
                             ([(low, Grip("low", (None, 0.0)))], [])):
         assert [(motion.name, motion.unheld) for motion in free_motions(space, held(space, *grips))] == expected
+    tube_ = ring(3)
+    bottom = np.flatnonzero(ends(tube_)[0])
+    assert not [*free_motions(tube_, held(tube_, (bottom, Grip("low", (None, 0.0)))))]  # nothing else holds it
 
 
 class Pressed(Loadable):

@@ -203,6 +203,7 @@ def test_a_deck_of_a_ball(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
     run = load(tmp_path / "whole")
     units = run.history.units
     assert run.history.dim == 3 and (units["elastic"], units["swept_volume"]) == ("N mm", "mm^3")
+    assert "a body of revolution: its 6 node(s) on the axis, x = 0, are held along x" in run.summary["notes"]
     assert "reaction_N" in run.summary["onset"] and run.summary["units"] == {"load": "N", "energy": "N mm"}
     assert run.summary["onset"]["boundary"] == "cut" and run.summary["energy"]["balance_error_relative"] < 1e-6
     header, first, *_ = (tmp_path / "whole" / "probes" / "cavity.csv").read_text().splitlines()

@@ -57,10 +57,12 @@ def check_element(name: str, space: Space, kernels: str = "compiled") -> Element
     if space.dim not in element.dimensions:
         cells = ("quadrilaterals", "hexahedra") if space.dim == 3 else ("hexahedra", "quadrilaterals")
         raise ParameterError(f"element {name} is for meshes of {cells[0]}; this one has {cells[1]}: take jbar")
-    if element.axisymmetric != space.axisymmetric:
-        raise ParameterError(f"element {name} is {'' if element.axisymmetric else 'not '}for bodies of revolution, and "
-                             f"the space is {'not ' if element.axisymmetric else ''}that of one: "
-                             f"take {'Space(mesh, axisymmetric=True)' if element.axisymmetric else 'axisymmetric'}")
+    if element.axisymmetric and not space.axisymmetric:
+        raise ParameterError(f"element {name} is for bodies of revolution, and the space is not that of one: take "
+                             f"Space(mesh, axisymmetric=True)")
+    if space.axisymmetric and not element.axisymmetric:
+        raise ParameterError(f"element {name} is not for bodies of revolution, and the space is that of one: take "
+                             f"axisymmetric")
     if kernels == "compiled" and not element.compiled:
         raise ParameterError(f"element {name} has no compiled loops: take --kernels forms")
     return element

@@ -58,7 +58,12 @@ class Sample:
 
     def revolved(self) -> Sample:
         """The sample as the half plane of a body of revolution (MeshError: it has nodes at x < 0)."""
-        return self if self.space.axisymmetric else replace(self, space=self.space.revolved())
+        if self.space.axisymmetric:
+            return self
+        space = self.space.revolved()
+        count = int(space.on_axis.sum())
+        note = f"a body of revolution: its {count} node(s) on the axis, x = 0, are held along x"
+        return replace(self, space=space, notes=(*self.notes, *([note] if count else [])))
 
     def nodes(self, boundary: str) -> np.ndarray:
         """Nodes of a named boundary.
