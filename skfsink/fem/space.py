@@ -22,6 +22,7 @@ from scipy.sparse import coo_array, csr_array
 
 from ..errors import MeshError
 from ..system.jit import njit
+from .exchange import ALONE, Exchange
 from .quadrature import AXES, points, shape_functions
 
 __all__ = ["Space", "node_key"]
@@ -36,6 +37,7 @@ class Space:
     Parameters
     ----------
     mesh: scikit-fem `MeshQuad` or `MeshHex`, coordinates in mm.
+    exchange: with the other parts of the body, if this is one of several.
 
     Raises
     ------
@@ -44,6 +46,7 @@ class Space:
     """
 
     mesh: skfem.Mesh
+    exchange: Exchange = ALONE
     X: np.ndarray = field(init=False)      #: nodal coordinates [mm], (n, dim)
     conn: np.ndarray = field(init=False)   #: nodes of the elements, lexicographic, (ne, na)
     N: np.ndarray = field(init=False)      #: shape functions at the Gauss points, (nq, na)
@@ -167,7 +170,7 @@ class Space:
         """Row sums of the mass matrix with weight `values` (ne, nq):  sum_q w_q values_q N_a(q), (n,)."""
         out = np.zeros(self.n_nodes)
         _lump(self.w, np.ascontiguousarray(values, float), self.nodes, self.N, out)
-        return out
+        return self.exchange.add(out)
 
     @cached_property
     def nodes(self) -> np.ndarray:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from copy import deepcopy
 from dataclasses import asdict, dataclass, field, fields
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -44,7 +45,7 @@ class State:
     gamma: np.ndarray
     W_max: np.ndarray
     deleted: np.ndarray
-    sink: np.ndarray | None = None
+    sink: np.ndarray | None = field(default_factory=lambda: None)
     deletions: list[tuple[float, int]] = field(default_factory=list)
     grip: float = 0.0
     time: float = 0.0
@@ -58,6 +59,21 @@ class State:
         zero = np.zeros_like(space.X)
         return cls(zero, zero.copy(), zero.copy(), np.ones(space.n_nodes), np.zeros_like(space.w),
                    np.zeros(space.n_elements, bool))
+
+    # --- fields that are elsewhere ---
+    def put_off(self, *names: str, fetch: Callable[[str], Any]) -> None:
+        """Let fields be fetched by their names when they are asked for; what there was of them is forgotten."""
+        for name in names:
+            self.__dict__.pop(name, None)
+            self.__dict__.setdefault("_elsewhere", {})[name] = fetch
+
+    if not TYPE_CHECKING:
+        def __getattr__(self, name: str) -> Any:
+            elsewhere = self.__dict__.get("_elsewhere", {})
+            if name not in elsewhere:
+                raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+            value = self.__dict__[name] = elsewhere.pop(name)(name)
+            return value
 
     def copy(self) -> State:
         """An independent copy, to start another analysis from."""

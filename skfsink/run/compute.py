@@ -17,6 +17,7 @@ from ..errors import CheckpointError, Interrupted, ParameterError, first_line
 from ..fields.state import State
 from ..meshing.kept_mesh import MESH, keep_mesh
 from ..pictures.of_a_run import draw_comparison, draw_run
+from ..ranks.integrator import ranks_text
 from ..results.history import History
 from ..results.probes import PROBES
 from ..results.result import Result
@@ -283,6 +284,8 @@ def _announce(simulation: Simulation, job: _Job) -> None:
     space = scene.sample.space
     for text in scene.sample.notes:
         job.display.say(f"note: {text}")
+    if ranks := ranks_text(scene.controls.analysis, scene.controls.integrator):
+        job.display.say(ranks)
     job.display.say(f"{scene.title}, mesh {scene.sample.name}: {space.n_elements} elements, "
                     f"{int(simulation.free.sum())} + {space.n_nodes} unknowns; {scene.controls.analysis} analysis in "
                     f"{job.folder}")

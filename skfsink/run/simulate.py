@@ -15,9 +15,10 @@ from ..errors import CheckpointError, ConvergenceError, Interrupted
 from ..fem.direct import one_thread_of_openblas
 from ..fields.body import Body
 from ..fields.state import State
-from ..methods.integrators import INTEGRATORS, Integrator
+from ..methods.integrators import Integrator
 from ..methods.rest import LoadingFromRest
 from ..methods.statics import Statics
+from ..ranks.integrator import integrator_of
 from ..scene.scene import Scene
 from .checkpoint import CHECKPOINT, load_checkpoint, save_checkpoint, save_state
 from .checks import warn
@@ -212,7 +213,7 @@ class Simulation:
             self._from_rest = LoadingFromRest(self.body, c.hht)
             self.integrator = self._from_rest.integrator
         else:
-            self.integrator = self.view.integrator = INTEGRATORS[c.integrator].of(self.body, c)
+            self.integrator = self.view.integrator = integrator_of(c.integrator, self.body, c)
         return self.integrator
 
     def _integrate(self) -> None:
@@ -224,7 +225,7 @@ class Simulation:
             view.end, cracked = self.PATIENCE * event_time, float(tracker.cracked_at.min())
         for _ in integrator.run(state, view.end):
             self.costs.steps += 1
-            self.observers.step(view.at(state, integrator.reaction, "step", dt=integrator.dt))
+            self.observers.step(view.at(state, lambda: integrator.reaction, "step", dt=integrator.dt))
             if tracker.separated and state.time >= self.crack.separated_at + self.scene.controls.aftermath:
                 break
             if cracked == np.inf and view.tips.branches:

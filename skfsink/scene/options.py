@@ -114,6 +114,8 @@ class Options:
     gradient
         Matrix of the gradient term of γ: "monotone" (keeps 0 < γ <= 1 on every mesh) or "gauss" (the paper's; that of
         the consistent sink in any case).
+    density_solver
+        Iteration for γ: "multigrid" (in active zones), or "jacobi" (everywhere; what several ranks take).
     deletion
         γ at which an element fails, in (0, 0.01].
     force_floor
@@ -212,6 +214,7 @@ class Options:
     length_scale: Annotated[float, SINK, Unit("mm")] = SinkLaw.length_scale
     sink: Annotated[str, SINK] = Controls.sink
     gradient: Annotated[str, SINK] = Controls.gradient
+    density_solver: Annotated[str, SINK] = Controls.density_solver
     deletion: Annotated[float, SINK] = Controls.deletion
     force_floor: Annotated[float, SINK] = Controls.force_floor
     speed: Annotated[float, LOADING, Unit("mm/s")] = 1e-3
