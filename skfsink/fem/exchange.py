@@ -6,6 +6,7 @@ count in one of them. What a part assembles at such a node is its share; :meth:`
 
 from __future__ import annotations
 
+import math
 from typing import Protocol
 
 import numpy as np
@@ -43,9 +44,11 @@ class Exchange(Protocol):
     Attributes
     ----------
     counted: the nodes that count in this part.
+    number: of this part.
     """
 
     counted: slice
+    number: int
 
     def add(self, x: np.ndarray) -> np.ndarray:
         """Make the shares of nodal values (n,) or (n, k) whole, in place; returns `x`."""
@@ -62,8 +65,14 @@ class Exchange(Protocol):
     def greatest(self, value: float) -> float:
         """The greatest of a number of each part; not a number if one of them is none."""
 
+    def maxima(self, values: np.ndarray) -> np.ndarray:
+        """The greatest of arrays of the same shape in all parts, entry by entry."""
+
     def dot(self, x: np.ndarray, y: np.ndarray) -> float:
         """Product over the whole body of two nodal fields (n,) that are whole."""
+
+    def norm(self, x: np.ndarray) -> float:
+        """Root of the product with itself."""
 
     def all(self, values: np.ndarray) -> np.ndarray:
         """Values (m, ...) of this part and all others, in the order of the parts."""
@@ -100,7 +109,7 @@ class _Own:
 class Alone:
     """A body in one piece."""
 
-    counted = slice(None)
+    counted, number = slice(None), 0
 
     def add(self, x: np.ndarray) -> np.ndarray:
         """Nothing to add."""
@@ -122,9 +131,17 @@ class Alone:
         """The number itself."""
         return value
 
+    def maxima(self, values: np.ndarray) -> np.ndarray:
+        """The array itself."""
+        return values
+
     def dot(self, x: np.ndarray, y: np.ndarray) -> float:
         """Product of two vectors."""
         return float(x @ y)
+
+    def norm(self, x: np.ndarray) -> float:
+        """Root of the product with itself."""
+        return math.sqrt(self.dot(x, x))
 
     def all(self, values: np.ndarray) -> np.ndarray:
         """The values themselves."""

@@ -162,8 +162,8 @@ class Body:
         if controls.contact:
             momentum.contact = Contact(space, momentum.parts, loading.free)
         density = DensitySolver(space, scene.sink_law, controls.sink, active_zone=controls.active_zone,
-                                solver=controls.density_solver, regions=scene.regions, kernels=controls.kernels, gradient=controls.gradient,
-                                absent=scene.cut)
+                                solver=controls.density_solver, regions=scene.regions, kernels=controls.kernels,
+                                gradient=controls.gradient, absent=scene.cut)
         return cls(momentum, density, loading, controls.deletion, threads, scene.broken)
 
     @property

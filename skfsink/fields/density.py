@@ -35,7 +35,7 @@ log = logging.getLogger(__name__)
 
 #: matrices of the gradient term: without positive off-diagonals (see :mod:`.gradient`), or as integrated by Gauss
 GRADIENTS = ("monotone", "gauss")
-#: of sinks that stay on the diagonal: conjugate gradients with multigrid, in active zones; or with the diagonal alone
+#: of sinks that stay on the diagonal: conjugate gradients with multigrid, or with the diagonal alone
 SOLVERS = ("multigrid", "jacobi")
 
 
@@ -70,8 +70,7 @@ class DensitySolver:
     law: sink and flux parameters, of the elements that are in no region.
     sink: one of :data:`.SINKS`.
     unchanged: a solve is left out when no sink coefficient moved by more than this, relatively, since the last one.
-    active_zone: solves with a tolerance of their own are made where gamma changes (see :mod:`.active_zone`), with
-        multigrid.
+    active_zone: solves with a tolerance of their own are made where gamma changes (see :mod:`.active_zone`).
     solver: one of :data:`SOLVERS`; that of a body in several parts is "jacobi".
     regions: elements with limiters of their own; the length l and epsilon are those of `law`.
     kernels: what evaluates the weak forms, a name in :data:`.BACKENDS`.
@@ -120,11 +119,12 @@ class DensitySolver:
         self._direct: Factorization | None = None
         self.zone: ActiveZone | None = None
         if solver == "jacobi" and self._quadrature.monotone:
-            self._iterative: AmgCG | JacobiCG = JacobiCG(space.exchange, tolerance)
+            intact = self._assemble(np.ones_like(space.w))[self.pattern.diagonal]
+            self._iterative: AmgCG | JacobiCG = JacobiCG(space.exchange, space.exchange.add(intact), tolerance)
         else:
-            self._iterative = amg = AmgCG(self.pattern.matrix(self._assemble(np.ones_like(space.w))), tolerance)
-            if active_zone and self._quadrature.monotone:
-                self.zone = ActiveZone(space.X, law.length_scale, amg)
+            self._iterative = AmgCG(self.pattern.matrix(self._assemble(np.ones_like(space.w))), tolerance)
+        if active_zone and self._quadrature.monotone:
+            self.zone = ActiveZone(space.X, law.length_scale, self._iterative)
         self._residual = 0.0
         self.solves = self.skipped = self.iterations = self.fallbacks = 0
 
@@ -137,7 +137,7 @@ class DensitySolver:
     def _error(self) -> float:
         """Bound of the error of gamma: A^-1 is positive, and A carries gamma = 1 to at least the load."""
         exchange, least = self.space.exchange, float(self.load[self.load > 0.0].min(initial=np.inf))
-        return 1e-9 + self._residual * float(exchange.dot(self.load, self.load) ** 0.5 / -exchange.greatest(-least))
+        return 1e-9 + self._residual * float(exchange.norm(self.load) / -exchange.greatest(-least))
 
     @property
     def factorisations(self) -> int:
@@ -212,8 +212,8 @@ class DensitySolver:
         self.iterations += solver.iterations
         self._residual = solver.residual
         if result is None and isinstance(solver, JacobiCG):
-            raise ConvergenceError(f"no density in {solver.max_iterations} conjugate gradients with the diagonal, their "
-                                   f"residual is {solver.residual:.2g}: take density_solver multigrid, on one rank")
+            raise ConvergenceError(f"no density in {solver.max_iterations} conjugate gradients with the diagonal, of "
+                                   f"a residual of {solver.residual:.2g}: take density_solver multigrid, on one rank")
         return result, zones
 
     def _assemble(self, sink: np.ndarray) -> np.ndarray:

@@ -6,13 +6,14 @@ asks: to take up their part, to step, to give what they have of a field. All of 
 
 from __future__ import annotations
 
+import logging
 import os
 import signal
 import sys
 import traceback
 from collections.abc import Callable
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 import numpy as np
 
@@ -59,7 +60,7 @@ class Member:
     def take(self, part: PartOfBody) -> None:
         """Take up a part of the body."""
         self.part, self.body = part, part.body(self.comm)
-        self.explicit = Explicit.of(self.body, _Only(part.controls))
+        self.explicit = Explicit(self.body, part.controls)
         self.logged = 0
 
     def begin(self, state: State) -> None:
@@ -102,13 +103,6 @@ class Member:
         """What the integrator remembers; vectors over free unknowns are those that count here."""
         unknowns, memory = self.body.space.exchange.over(self.body.free), self.explicit.memory()
         return {**memory, "mode": memory["mode"][unknowns.counted], "numbers": unknowns.numbers[unknowns.counted]}
-
-
-class _Only:
-    """Options of an event, of which a part needs those of the explicit scheme alone."""
-
-    def __init__(self, explicit: Any) -> None:
-        self.explicit = explicit
 
 
 class Crew:
@@ -202,6 +196,7 @@ class Crew:
         """Do what the first rank asks, until it lets this one go; what goes wrong here alone ends all ranks."""
         for interrupt in (signal.SIGINT, signal.SIGTERM):  # the first rank decides what becomes of them
             signal.signal(interrupt, signal.SIG_IGN)
+        logging.disable()  # what there is to say the first rank says
         try:
             while (task := self._next_task())[0] != "end":
                 with suppress(SkfsinkError):  # it is that of all ranks, and the first one tells it

@@ -18,6 +18,7 @@ from .world import world
 __all__ = ["InParts", "integrator_of", "ranks_text"]
 
 MOVING, DENSITY = ("u", "v", "a", "W_max"), ("gamma", "sink")
+NODAL = {"reaction", "viscous"}  # of the memory of an integrator
 
 
 def integrator_of(name: str, body: Body, controls: EventControls) -> Integrator:
@@ -137,8 +138,10 @@ class InParts:
         mode: np.ndarray = np.empty(sum(memory["numbers"].size for memory in memories))
         for memory in memories:
             mode[memory["numbers"]] = memory["mode"]
-        nodal = {name: self._whole(name, memories) for name in ("reaction", "viscous") if name in first}
-        return {**{name: value for name, value in first.items() if name != "numbers"}, "mode": mode, **nodal}
+        whole = {name: value for name, value in first.items() if name != "numbers"} | {"mode": mode}
+        for name in NODAL.intersection(first):
+            whole[name] = self._whole(name, memories)
+        return whole
 
     def _whole(self, name: str, memories: list[dict[str, np.ndarray]]) -> np.ndarray:
         whole: np.ndarray = np.empty_like(self.body.space.X)
@@ -154,8 +157,9 @@ class InParts:
         for part in self.crew.numbers:
             dofs = (part.nodes[:, None] * dim + np.arange(dim)).ravel()
             own = number[dofs[free[dofs]]]
-            nodal = {name: memory[name][part.nodes] for name in ("reaction", "viscous") if name in memory}
-            memories.append({**memory, "mode": memory["mode"][own], **nodal, "zone_depths": np.zeros(0)})
+            memories.append({**memory, "mode": memory["mode"][own]})
+            for name in NODAL.intersection(memory):
+                memories[-1][name] = memory[name][part.nodes]
+        self.body.take(state)
         self.crew.restore(state, memories)
         self._renew(state, False)
-        self.body.take(state)

@@ -5,6 +5,7 @@ Sums are made in the order of the ranks, so that all of them get the same bits, 
 
 from __future__ import annotations
 
+import math
 import time
 from typing import TYPE_CHECKING
 
@@ -47,7 +48,7 @@ class MPIExchange:
 
     def __init__(self, comm: MPI.Intracomm, part: Numbers, n_nodes: int) -> None:
         self.comm, self.part, self.n_nodes = comm, part, n_nodes
-        self.counted = slice(0, part.counted)
+        self.counted, self.number = slice(0, part.counted), int(comm.rank)
         shared = [nodes for _, nodes in sorted(part.shared.items())]
         self._between = np.unique(np.concatenate([*shared, np.zeros(0, np.int64)])).astype(np.int64)
         self._turns = sorted([*part.shared, comm.rank])  # ranks in the order in which their shares are added
@@ -102,9 +103,18 @@ class MPIExchange:
         """The greatest of a number of each part; not a number if one of them is none."""
         return float(self._each(np.array([value], float)).max())
 
+    def maxima(self, values: np.ndarray) -> np.ndarray:
+        """The greatest of arrays of the same shape in all parts, entry by entry."""
+        greatest: np.ndarray = self._each(values).max(axis=0)
+        return greatest
+
     def dot(self, x: np.ndarray, y: np.ndarray) -> float:
         """Product over the whole body of two nodal fields (n,) that are whole."""
         return self.total(float(x[self.counted] @ y[self.counted]))
+
+    def norm(self, x: np.ndarray) -> float:
+        """Root of the product with itself."""
+        return math.sqrt(self.dot(x, x))
 
     def all(self, values: np.ndarray) -> np.ndarray:
         """Values (m, ...) of this part and all others, in the order of the parts."""

@@ -93,7 +93,8 @@ def parts_of(body: Body, controls: ExplicitControls, ranks: int) -> list[PartOfB
             part, space.n_nodes, mesh, momentum.material, density.law, _regions(body, part.elements),
             {"element": momentum.element, "force_floor": momentum.force_floor,
              "bulk_viscosity": BulkViscosity(*momentum.bulk_viscosity)},
-            {"sink": density.sink, "unchanged": density.unchanged, "gradient": density.gradient, "absent": absent},
+            {"sink": density.sink, "unchanged": density.unchanged, "gradient": density.gradient, "absent": absent,
+             "active_zone": density.zone is not None},
             body.loading.of_nodes(part.nodes), body.deletion, controls))
     return found
 

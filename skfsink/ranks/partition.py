@@ -51,7 +51,7 @@ def partition(conn: np.ndarray, parts: int) -> np.ndarray:
     beside = csr_array(touches @ touches.T)
     faces = (beside.data >= na // 2) & (beside.data < na)  # elements that share a side (face), not themselves
     start = np.concatenate([[0], np.cumsum(faces)])[beside.indptr]
-    _, part = pymetis.part_graph(parts, xadj=start, adjncy=beside.indices[faces])
+    _, part = pymetis.part_graph(parts, pymetis.CSRAdjacency(start, beside.indices[faces]))
     return _without_holes(np.asarray(part, np.int64), parts)
 
 

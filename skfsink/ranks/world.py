@@ -37,8 +37,8 @@ def world() -> MPI.Intracomm | None:
                              f"its extra mpi, or run on one rank") from None
     comm = MPI.COMM_WORLD
     if comm.size != asked:
-        raise ParameterError(f"mpiexec has started {asked} ranks, and mpi4py sees {comm.size}: it is of another MPI than "
-                             f"mpiexec; take the mpiexec of the same environment")
+        raise ParameterError(f"mpiexec has started {asked} ranks, and mpi4py sees {comm.size}: it is of another MPI; "
+                             f"take the mpiexec of the same environment")
     return comm
 
 

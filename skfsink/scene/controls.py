@@ -45,7 +45,7 @@ class Controls:
         OMP_NUM_THREADS or the machine's cores, at most 4. Runs with the same number agree to the last bit.
     start: of a dynamic analysis, "onset" (statics up to there) or "rest" (see :mod:`.rest`).
     density_solver: "multigrid" or "jacobi"; see :data:`.SOLVERS`. Several ranks take "jacobi" in the event.
-    active_zone: explicit steps solve for gamma only where it changes (see :mod:`.active_zone`), with multigrid.
+    active_zone: explicit steps solve for gamma only where it changes (see :mod:`.active_zone`).
     contact: the lips of cracks bear on each other (see :mod:`.contact`), in events and quasi-static passes.
     kernels: "compiled", or "forms" (scikit-fem forms, for small meshes), or another name in :data:`.BACKENDS`.
     bulk_viscosity_linear, bulk_viscosity_quadratic: coefficients b1 and b2 of the bulk viscosity, [0, 10].

@@ -115,7 +115,7 @@ class Options:
         Matrix of the gradient term of γ: "monotone" (keeps 0 < γ <= 1 on every mesh) or "gauss" (the paper's; that of
         the consistent sink in any case).
     density_solver
-        Iteration for γ: "multigrid" (in active zones), or "jacobi" (everywhere; what several ranks take).
+        Conjugate gradients for γ with "multigrid", or with "jacobi", the diagonal alone (what several ranks take).
     deletion
         γ at which an element fails, in (0, 0.01].
     force_floor
