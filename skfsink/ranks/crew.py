@@ -20,6 +20,7 @@ import numpy as np
 from ..errors import SkfsinkError
 from ..fields.state import State
 from ..methods.explicit import Explicit
+from ..system.peak import peak_rss_mb
 from .mpi import wait
 from .part import PartOfBody, state_of
 
@@ -30,7 +31,7 @@ __all__ = ["Crew", "Member", "lead"]
 
 IDLE = 1e-3    # s without a task, after which a rank looks for one less often
 UNEXPECTED = 1  # exit status of a program that ends by a mistake of its own
-TASKS = ("end", "take", "begin", "restore", "step", "gather", "deletions", "memory", "share", "sync")
+TASKS = ("end", "take", "begin", "restore", "step", "gather", "deletions", "memory", "share", "sync", "peaks")
 
 
 def lead(comm: MPI.Intracomm, program: Callable[[], NoReturn]) -> NoReturn:
@@ -187,6 +188,13 @@ class Crew:
         assert found is not None
         return found
 
+    def peaks(self) -> list[float]:
+        """Greatest memory that each rank has used [MB]."""
+        self._ask("peaks")
+        found = self.comm.gather(peak_rss_mb())
+        assert found is not None
+        return found
+
     def end(self) -> None:
         """Let all others go."""
         self._ask("end")
@@ -225,6 +233,8 @@ class Crew:
             comm.gather(member.field(FIELDS[detail]))
         elif task == "deletions":
             comm.gather(member.new_deletions())
+        elif task == "peaks":
+            comm.gather(peak_rss_mb())
         elif task == "memory":
             comm.gather(member.memory())
         else:

@@ -84,6 +84,15 @@ class InParts:
             self._reaction = self._fetch("reaction")
         return self._reaction
 
+    @property
+    def solves(self) -> int:
+        """Solves for gamma in the parts."""
+        return self._own.density.solves
+
+    def peaks(self) -> list[float]:
+        """Greatest memory that each rank has used [MB]."""
+        return self.crew.peaks()
+
     def begin(self, state: State) -> None:
         """Set the body in motion."""
         self.crew.begin(state)

@@ -18,7 +18,7 @@ from ..fields.state import State
 from ..methods.integrators import Integrator
 from ..methods.rest import LoadingFromRest
 from ..methods.statics import Statics
-from ..ranks.integrator import integrator_of
+from ..ranks.integrator import InParts, integrator_of
 from ..scene.scene import Scene
 from .checkpoint import CHECKPOINT, load_checkpoint, save_checkpoint, save_state
 from .checks import warn
@@ -257,14 +257,17 @@ class Simulation:
     # --- costs and checkpoints ---
     def cost(self) -> dict[str, Any]:
         """Wall times and counts since the run began, over all its sessions."""
-        stepping, rejected = 0, 0
+        stepping, rejected, others, peaks = 0, 0, 0, {}
+        if isinstance(self.integrator, InParts):
+            others, peaks = self.integrator.solves, {"peaks": self.integrator.peaks()}
         if self.integrator is not None:
             stepping = self.integrator.factorisations
             rejected = self.integrator.rejected if self.state.phase != "loading" else 0
         factorisations = (self.costs.factorisations + self.statics.factorisations + self.density.factorisations
                           + stepping)
         return {"wall": dict(self.costs.wall), "steps": self.costs.steps, "rejected_steps": rejected,
-                "gamma_solves": self.costs.gamma_solves + self.density.solves, "factorisations": factorisations}
+                "gamma_solves": self.costs.gamma_solves + self.density.solves + others,
+                "factorisations": factorisations, **peaks}
 
     def _save(self) -> None:
         self.costs.lap(self.state.phase)
