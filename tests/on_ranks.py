@@ -20,8 +20,8 @@ from skfsink.material.regions import Region
 from skfsink.methods.controls import ExplicitControls
 from skfsink.methods.explicit import Explicit
 from skfsink.methods.frequency import highest_frequency
-from skfsink.ranks.crew import Member
-from skfsink.ranks.part import parts_of, state_of
+from skfsink.methods.ranks.crew import Member
+from skfsink.methods.ranks.part import parts_of, state_of
 
 COMM = MPI.COMM_WORLD
 LAW, STRONG = SinkLaw(), SinkLaw(phi=0.3)

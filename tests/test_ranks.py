@@ -22,7 +22,7 @@ from skfsink.errors import ParameterError
 from skfsink.fem.space import Space
 from skfsink.fields.density import DensitySolver
 from skfsink.material import SinkLaw
-from skfsink.ranks.partition import numbers, partition
+from skfsink.methods.ranks.partition import numbers, partition
 
 HERE = Path(__file__).resolve().parent
 MPIEXEC = shutil.which("mpiexec", path=os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")]))

@@ -13,7 +13,7 @@ from cyclopts import App, ArgumentCollection, Group
 from cyclopts.exceptions import CycloptsError, UnknownCommandError
 
 from ..errors import Interrupted, SkfsinkError
-from ..ranks.world import first, world
+from ..methods.ranks.world import first, world
 from ..system.version import __version__
 
 __all__ = ["command", "run"]
@@ -50,7 +50,7 @@ def run(app: App, arguments: list[str] | None, given_names: Collection[str] = ()
         raise SystemExit(BAD_INPUT) from None
     if comm is None:
         _run(app, arguments, given_names)
-    from ..ranks.crew import lead
+    from ..methods.ranks.crew import lead
     lead(comm, lambda: _run(app, arguments, given_names))
 
 

@@ -1,7 +1,7 @@
 """What the parts of a body that is computed in parts tell each other; a body in one piece tells nobody.
 
 Elements are in one part each, nodes between parts in several: all of these have the same values of nodal fields, and
-count in one of them. What a part assembles at such a node is its share; :meth:`Exchange.add` makes the whole of it.
+count in one of them. What a part assembles at such a node is its share; :meth:`Exchange.whole` makes the whole of it.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class Unknowns(Protocol):
     counted: np.ndarray
     size: int
 
-    def add(self, x: np.ndarray) -> None:
+    def whole(self, x: np.ndarray) -> None:
         """Make shares (m,) whole, in place."""
 
     def total(self, value: float) -> float:
@@ -50,7 +50,7 @@ class Exchange(Protocol):
     counted: slice
     number: int
 
-    def add(self, x: np.ndarray) -> np.ndarray:
+    def whole(self, x: np.ndarray) -> np.ndarray:
         """Make the shares of nodal values (n,) or (n, k) whole, in place; returns `x`."""
 
     def total(self, value: float) -> float:
@@ -94,7 +94,7 @@ class _Own:
         self.size = int(mask.sum())
         self.numbers, self.counted = np.arange(self.size), np.ones(self.size, bool)
 
-    def add(self, x: np.ndarray) -> None:
+    def whole(self, x: np.ndarray) -> None:
         """Nothing to add."""
 
     def total(self, value: float) -> float:
@@ -111,7 +111,7 @@ class Alone:
 
     counted, number = slice(None), 0
 
-    def add(self, x: np.ndarray) -> np.ndarray:
+    def whole(self, x: np.ndarray) -> np.ndarray:
         """Nothing to add."""
         return x
 

@@ -62,7 +62,7 @@ class JacobiCG:
 
     def residual_of(self, A: csr_array, x: np.ndarray, b: np.ndarray) -> np.ndarray:
         """b - A x."""
-        return b - self.exchange.add(A @ x)
+        return b - self.exchange.whole(A @ x)
 
     def settle(self, A: csr_array, D: np.ndarray, b: np.ndarray, x: np.ndarray) -> np.ndarray:
         """Let the values of `x` at dead unknowns follow their sinks, in place; returns the residual."""
@@ -102,7 +102,7 @@ class JacobiCG:
         rz, square = exchange.totals(_advance(nodes, counted, D, alpha, p, q, x, r))
         while self.iterations < self.max_iterations:
             _direction(nodes, matrix, D, rz / rz_old, r, p, q)
-            pq = exchange.total(_product(nodes, counted, p, exchange.add(q)))
+            pq = exchange.total(_product(nodes, counted, p, exchange.whole(q)))
             if not (np.isfinite(pq) and pq > 0.0):
                 return False
             rz_old = rz

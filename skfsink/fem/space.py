@@ -170,7 +170,7 @@ class Space:
         """Row sums of the mass matrix with weight `values` (ne, nq):  sum_q w_q values_q N_a(q), (n,)."""
         out = np.zeros(self.n_nodes)
         _lump(self.w, np.ascontiguousarray(values, float), self.nodes, self.N, out)
-        return self.exchange.add(out)
+        return self.exchange.whole(out)
 
     @cached_property
     def nodes(self) -> np.ndarray:

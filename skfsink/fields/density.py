@@ -120,7 +120,7 @@ class DensitySolver:
         self.zone: ActiveZone | None = None
         if solver == "jacobi" and self._quadrature.monotone:
             intact = self._assemble(np.ones_like(space.w))[self.pattern.diagonal]
-            self._iterative: AmgCG | JacobiCG = JacobiCG(space.exchange, space.exchange.add(intact), tolerance)
+            self._iterative: AmgCG | JacobiCG = JacobiCG(space.exchange, space.exchange.whole(intact), tolerance)
         else:
             self._iterative = AmgCG(self.pattern.matrix(self._assemble(np.ones_like(space.w))), tolerance)
         if active_zone and self._quadrature.monotone:
@@ -171,7 +171,7 @@ class DensitySolver:
         data = self._assemble(sink)
         result, zones = None, before.zones
         if self._quadrature.monotone or sink.max() < 1e3 * sink.min():
-            diagonal = exchange.add(data[self.pattern.diagonal])
+            diagonal = exchange.whole(data[self.pattern.diagonal])
             result, zones = self._iterate(self.pattern.matrix(data), diagonal, before, tolerance)
         if result is None:
             result = self._factorise(data)

@@ -241,7 +241,7 @@ class Momentum:
         exchange, least = self.space.exchange, self.backend.force(u, out)
         self.least_J = -exchange.greatest(-least)
         self.energy = exchange.total(self.backend.energy)
-        exchange.add(out)
+        exchange.whole(out)
         if self.dead is not None:
             out[self.dead.nodes] -= self.dead.values
             self.loads = self.dead.potential(u)
@@ -259,7 +259,7 @@ class Momentum:
         """
         out = np.empty_like(self.space.X) if out is None else out
         self.compression = self.space.exchange.greatest(self.backend.viscous_force(u, v, out))
-        return self.space.exchange.add(out)
+        return self.space.exchange.whole(out)
 
     def unheld(self, x: np.ndarray) -> np.ndarray:
         """Forces or displacements (n, dim) without what planes on which nodes slide take; `x` itself without these."""

@@ -88,7 +88,7 @@ def _lanczos(matrix: Rows, unknowns: Unknowns, start: np.ndarray, tolerance: flo
         while True:
             following = np.empty_like(start)
             _product(matrix, vectors[-1], previous, beta, unknowns.counted, following)
-            unknowns.add(following)
+            unknowns.whole(following)
             alpha = unknowns.total(_along(following, vectors[-1], unknowns.counted))
             beta = float(np.sqrt(unknowns.total(_without(following, vectors[-1], alpha, unknowns.counted))))
             if beta > 0.0:

@@ -16,8 +16,8 @@ from typing import Any
 from ..errors import CheckpointError, Interrupted, ParameterError, first_line
 from ..fields.state import State
 from ..meshing.kept_mesh import MESH, keep_mesh
+from ..methods.ranks.integrator import ranks_text
 from ..pictures.of_a_run import draw_comparison, draw_run
-from ..ranks.integrator import ranks_text
 from ..results.history import History
 from ..results.probes import PROBES
 from ..results.result import Result

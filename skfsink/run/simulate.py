@@ -16,9 +16,9 @@ from ..fem.direct import one_thread_of_openblas
 from ..fields.body import Body
 from ..fields.state import State
 from ..methods.integrators import Integrator
+from ..methods.ranks.integrator import InParts, integrator_of
 from ..methods.rest import LoadingFromRest
 from ..methods.statics import Statics
-from ..ranks.integrator import InParts, integrator_of
 from ..scene.scene import Scene
 from .checkpoint import CHECKPOINT, load_checkpoint, save_checkpoint, save_state
 from .checks import warn

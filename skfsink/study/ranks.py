@@ -59,13 +59,13 @@ event_at = 0
 [[grips]]
 boundary = "top"
 x = 0
-y = "10 m/s"
+y = "5 m/s"
 z = 0
 
 [[grips]]
 boundary = "bottom"
 x = 0
-y = "-10 m/s"
+y = "-5 m/s"
 z = 0
 """
 

@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING, NoReturn
 
 import numpy as np
 
-from ..errors import SkfsinkError
-from ..fields.state import State
-from ..methods.explicit import Explicit
-from ..system.peak import peak_rss_mb
+from ...errors import SkfsinkError
+from ...fields.state import State
+from ...system.peak import peak_rss_mb
+from ..explicit import Explicit
 from .mpi import wait
 from .part import PartOfBody, state_of
 
@@ -51,7 +51,8 @@ def lead(comm: MPI.Intracomm, program: Callable[[], NoReturn]) -> NoReturn:
 class Member:
     """One rank with its part of the body.
 
-    Memory: its part, the state of this and its integrator: every task goes on with them.
+    Memory: its part, the state of this and its integrator: after `take`, and `begin` or `restore`, `step`, `sync`,
+    `share`, `field`, `new_deletions` and `memory` go on with them.
     """
 
     def __init__(self, comm: MPI.Intracomm) -> None:
@@ -109,7 +110,7 @@ class Member:
 class Crew:
     """All ranks, as the first of them leads them, or another one serves.
 
-    Memory: the part of this rank; each task goes on with what the one before has left.
+    Memory: the part of this rank, and the `numbers` of all: after `take`, `begin`, `restore` and `gather` are of them.
 
     Parameters
     ----------

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_array
 
-from ..errors import ParameterError
+from ...errors import ParameterError
 
 __all__ = ["Numbers", "numbers", "partition"]
 

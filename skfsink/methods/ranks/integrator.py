@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from ..fields.body import Body
-from ..fields.state import State
-from ..methods.controls import EventControls
-from ..methods.integrators import INTEGRATORS, Integrator
+from ...fields.body import Body
+from ...fields.state import State
+from ..controls import EventControls
+from ..integrators import INTEGRATORS, Integrator
 from .crew import Crew
 from .part import parts_of
 from .world import world
@@ -45,7 +45,7 @@ class InParts:
     What changes in the parts is fetched when it is asked for: fields of the state, the reaction, and with the
     displacement what the momentum balance of the whole body knows at it.
 
-    Memory: that of all ranks, and the time of the fields at hand.
+    Memory: that of all ranks: after `begin` or `restore`, `run`, `sync` and `reaction` are of the state last stepped.
     """
 
     factorisations = 0

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from ..fem.exchange import Unknowns
+from ...fem.exchange import Unknowns
 from .partition import Numbers
 
 if TYPE_CHECKING:
@@ -39,6 +39,8 @@ def wait(request: MPI.Request, idle: float = np.inf) -> None:
 class MPIExchange:
     """See :class:`.Exchange`.
 
+    Memory: buffers and numbers, so that they are made once; `whole` and `over` depend on no earlier call.
+
     Parameters
     ----------
     comm: the ranks.
@@ -55,7 +57,7 @@ class MPIExchange:
         self._buffers: dict[int, dict[int, tuple[np.ndarray, np.ndarray]]] = {}
         self._unknowns: dict[int, tuple[np.ndarray, _Unknowns]] = {}
 
-    def add(self, x: np.ndarray) -> np.ndarray:
+    def whole(self, x: np.ndarray) -> np.ndarray:
         """Make the shares of nodal values (n,) or (n, k) whole, in place; returns `x`."""
         wide = x if x.ndim == 2 else x[:, None]
         k = wide.shape[1]
@@ -157,10 +159,10 @@ class _Unknowns:
         number = np.cumsum(marked).astype(np.int64) - 1
         self.numbers, self.size = number[numbers], int(marked.sum())
 
-    def add(self, x: np.ndarray) -> None:
+    def whole(self, x: np.ndarray) -> None:
         """Make shares (m,) whole, in place."""
         self._wide.reshape(-1)[self._place] = x
-        x[:] = self._exchange.add(self._wide).reshape(-1)[self._place]
+        x[:] = self._exchange.whole(self._wide).reshape(-1)[self._place]
 
     def total(self, value: float) -> float:
         """Sum of a number of each part."""

@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import skfem
 
-from ..errors import ParameterError
-from ..fem.backend import BulkViscosity
-from ..fem.space import Space
-from ..fields.body import Body
-from ..fields.density import DensitySolver
-from ..fields.momentum import Momentum
-from ..fields.state import State
-from ..loads.schedule import Loading
-from ..material import Material, SinkLaw
-from ..material.regions import Region
-from ..methods.controls import ExplicitControls
+from ...errors import ParameterError
+from ...fem.backend import BulkViscosity
+from ...fem.space import Space
+from ...fields.body import Body
+from ...fields.density import DensitySolver
+from ...fields.momentum import Momentum
+from ...fields.state import State
+from ...loads.schedule import Loading
+from ...material import Material, SinkLaw
+from ...material.regions import Region
+from ..controls import ExplicitControls
 from .mpi import MPIExchange
 from .partition import Numbers, numbers, partition
 
