@@ -22,8 +22,8 @@ class State:
     A field that is added here is copied, kept in a checkpoint and read from it without being named anywhere else: it
     has to be an array, None, or of plain values as JSON has them.
 
-    Memory: it is the memory of a run: `begin_event` changes it, `stored` gives all of it, `put_off` lets a part of it be
-    elsewhere.
+    Memory: it is the memory of a run: `begin_event` changes it, `stored` gives all of it, `put_off` lets a part
+    of it be elsewhere.
 
     Attributes
     ----------

@@ -34,7 +34,7 @@ UNEXPECTED = 1  # exit status of a program that ends by a mistake of its own
 TASKS = ("end", "take", "begin", "restore", "step", "gather", "deletions", "memory", "share", "sync", "peaks")
 
 
-def lead(comm: MPI.Intracomm, program: Callable[[], NoReturn]) -> NoReturn:
+def lead(comm: MPI.Intracomm, program: Callable[[], object]) -> NoReturn:
     """Run the `program` on the first rank, and let the others serve it; all end with it."""
     crew = Crew(comm)
     if comm.rank:
@@ -46,6 +46,11 @@ def lead(comm: MPI.Intracomm, program: Callable[[], NoReturn]) -> NoReturn:
             comm.Abort(UNEXPECTED)
         crew.end()
         raise
+    except BaseException:
+        traceback.print_exc()
+        comm.Abort(UNEXPECTED)
+    crew.end()
+    raise SystemExit(0)
 
 
 class Member:

@@ -27,8 +27,8 @@ class View:
     Observers change nothing in it, but for :class:`.Crack`, which looks first and sets `tips`, `moment` and `waiting`
     for all others; an observer in its place has to set them too.
 
-    Memory: all of it: the run moves it on with `at`, and `load`, `displacement`, `reaction`, `stress`, `stress_is_known`,
-    `step_share` and `crossed_multiple_of` are of the moment it is at.
+    Memory: all of it: the run moves it on with `at`, and `load`, `displacement`, `reaction`, `stress`,
+    `stress_is_known`, `step_share` and `crossed_multiple_of` are of the moment it is at.
 
     Attributes
     ----------
