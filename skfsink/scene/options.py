@@ -130,6 +130,9 @@ class Options:
         Of the dynamic event: "explicit" or "hht".
     front
         Quasi-static: a pass fails the points with at least this share of the greatest stored energy, in [0, 1].
+    linear
+        Statics: "direct" (factors), or conjugate gradients with the hierarchies "multigrid" or "petsc-gamg", for bodies
+        whose factors are too large.
     element
         "jbar" (element-constant J̄), "plain" (standard Q1, locks) or "planestress" (thin sheet with free faces, in 2D).
     kernels
@@ -222,6 +225,7 @@ class Options:
     analysis: Annotated[str, ANALYSIS] = Controls.analysis
     integrator: Annotated[str, ANALYSIS] = Controls.integrator
     front: Annotated[float, ANALYSIS] = StaticsControls.front
+    linear: Annotated[str, ANALYSIS] = StaticsControls.linear
     element: Annotated[str, ANALYSIS] = Controls.element
     kernels: Annotated[str, ANALYSIS] = Controls.kernels
     contact: Annotated[bool, CONTACT] = Controls.contact
@@ -319,7 +323,7 @@ class Options:
                                                 raised_mass=self.raised_mass),
             hht=HHTControls(self.hht_alpha, self.hht_dt, coupling=self.coupling, mass=self.mass,
                             mass_floor=self.mass_floor),
-            statics=StaticsControls(front=self.front))
+            statics=StaticsControls(front=self.front, linear=self.linear))
 
     def parameters(self) -> dict[str, Any]:
         """The options that decide results, by name; the energy limiter is that of the law where it was 0.
