@@ -257,9 +257,9 @@ class Simulation:
     # --- costs and checkpoints ---
     def cost(self) -> dict[str, Any]:
         """Wall times and counts since the run began, over all its sessions."""
-        stepping, rejected, others, peaks = 0, 0, 0, {}
+        stepping, rejected, others, ranks = 0, 0, 0, {}
         if isinstance(self.integrator, InParts):
-            others, peaks = self.integrator.solves, {"peaks": self.integrator.peaks()}
+            others, ranks = self.integrator.solves, {"ranks": self.integrator.cost()}
         if self.integrator is not None:
             stepping = self.integrator.factorisations
             rejected = self.integrator.rejected if self.state.phase != "loading" else 0
@@ -267,7 +267,7 @@ class Simulation:
                           + stepping)
         return {"wall": dict(self.costs.wall), "steps": self.costs.steps, "rejected_steps": rejected,
                 "gamma_solves": self.costs.gamma_solves + self.density.solves + others,
-                "factorisations": factorisations, **peaks}
+                "factorisations": factorisations, **ranks}
 
     def _save(self) -> None:
         self.costs.lap(self.state.phase)

@@ -82,7 +82,7 @@ def summarize(scene: Scene, simulation: Simulation) -> dict[str, Any]:
                  "rejected_steps": cost["rejected_steps"], "gamma_solves": cost["gamma_solves"],
                  "factorisations": cost["factorisations"],
                  "peak_rss_mb": round(peak_rss_mb(), 1),
-                 **({"ranks_peak_rss_mb": [round(peak, 1) for peak in cost["peaks"]]} if "peaks" in cost else {})},
+                 **({"ranks": cost["ranks"]} if "ranks" in cost else {})},
         "versions": versions(), "assumed": list(scene.assumed), "moments": simulation.frames.moments,
         "series": "loading" if simulation.unfailed else "run"}
 

@@ -44,6 +44,8 @@ H = 0.05                    # of the hexahedra [mm]: l/2
 SIZE = {"strong": (50_000, 200_000), "weak": (100_000,)}   # elements: of the body, and of each rank
 COUNTS = (1, 2, 4, 8)
 STEPS = 150                 # about, of the event
+BODIES, CLUSTERS = (10**7, 10**8), (64, 1_024, 16_384)   # hexahedra and cores that are predicted
+LATENCY, BANDWIDTH = 2e-6, 1e10   # of a network of a cluster [s; bytes/s], assumed
 DECK = """case = "custom"
 
 [parameters]
@@ -111,7 +113,9 @@ class _Event:
         cost = summary["cost"]
         return {"elements": summary["elements"], "ranks": self.count, "steps": cost["steps"],
                 "event_s": cost["wall_s"]["event"], "solves": cost["gamma_solves"],
-                "peaks_mb": cost.get("ranks_peak_rss_mb", [cost["peak_rss_mb"]]),
+                "peaks_mb": cost["ranks"]["peak_rss_mb"] if "ranks" in cost else [cost["peak_rss_mb"]],
+                **{name: cost["ranks"][name] if "ranks" in cost else 0 for name in (
+                    "halos", "sums", "gamma_iterations")},
                 "D": summary["energy"]["D_sink_final"], "work": summary["energy"]["external_work"]}
 
 
@@ -133,10 +137,60 @@ def step_time(point: dict[str, Any]) -> float:
     return float(point["event_s"] / point["steps"])
 
 
+@dataclass(frozen=True)
+class Costs:
+    """A model of the time of a step, fitted to what was measured.
+
+    Attributes
+    ----------
+    element: time of a hexahedron [s].   exchange: of an exchange between two ranks, its Python included [s].
+    halos, sums, solves: exchanges at nodes between parts, sums of numbers, and solves for gamma, in a step.
+    """
+
+    element: float
+    exchange: float
+    halos: float
+    sums: float
+    solves: float
+
+    @classmethod
+    def fitted(cls, points: Points) -> Costs | None:
+        """To the largest body on one rank, and the smallest one on two; None as long as one of them is missing."""
+        strong = [p for key, p in points.items() if key.startswith("strong") and "failed" not in p]
+        alone, two = [p for p in strong if p["ranks"] == 1], [p for p in strong if p["ranks"] == 2]
+        if not alone or not two:
+            return None
+        large, small = max(alone, key=lambda p: p["elements"]), min(two, key=lambda p: p["elements"])
+        element, steps = step_time(large) / large["elements"], small["steps"]
+        made = (small["halos"] + small["sums"]) / steps
+        rest = step_time(small) - element * small["elements"] / 2
+        return cls(element, max(rest, 0.0) / made, small["halos"] / steps, small["sums"] / steps,
+                   small["solves"] / steps)
+
+    def parts(self, elements: float, ranks: float) -> dict[str, float]:
+        """Time of a step of a body on ranks of a cluster, by what it is spent on [s]."""
+        own = elements / ranks
+        border = 8 * 2 * 6 * own ** (2 / 3)  # bytes: two numbers a node on the mean, of the six sides of a cube
+        return {"elements": self.element * own,
+                "borders": self.halos * (self.exchange + LATENCY + border / BANDWIDTH),
+                "sums": self.sums * (self.exchange + LATENCY * np.log2(ranks) + 8 * ranks / BANDWIDTH),
+                "gamma to the first rank": self.solves * 8 * elements / BANDWIDTH}
+
+
 def draw(points: Points, path: Path) -> None:
-    """Time of a step against the ranks, and how much faster they are than one."""
-    cores = os.cpu_count() or 1
-    with page(path, "An explicit event on several ranks", 1, 2, 2.6) as axes:
+    """Time of a step against the ranks, how much faster they are than one, and what the model says of more of them."""
+    cores, costs = os.cpu_count() or 1, Costs.fitted(points)
+    with page(path, "An explicit event on several ranks", 1, 3, 2.5) as axes:
+        if costs is not None:
+            ranks = np.logspace(0, 5, 60)
+            for body, style in zip(BODIES, ("--", "-")):
+                found = [costs.parts(body, count) for count in ranks]
+                axes[2].loglog(ranks, [1e3 * sum(f.values()) for f in found], "k" + style,
+                               label=f"{body:.0e} hexahedra".replace("e+0", "e"))
+                for name in found[0]:
+                    if style == "-":
+                        axes[2].loglog(ranks, [1e3 * f[name] for f in found], lw=0.8, label=name)
+            axes[2].set(xlabel="ranks", ylabel="time of a step (ms)", ylim=(1e-2, 1e6), title="model")
         for size in sorted({p["elements"] for key, p in points.items() if key.startswith("strong")}):
             mine = [p for key, p in points.items() if key.startswith("strong") and p["elements"] == size]
             counts = np.array([p["ranks"] for p in mine])
@@ -161,6 +215,21 @@ def table(points: Points) -> list[str]:
         faster = f"{grown * step_time(one) / step_time(p):.2f}" if one else ""
         lines.append(f"| {kind} | {p['elements']:,} | {p['ranks']} | {p['steps']} | {p['solves']} | "
                      f"{1e3 * step_time(p):.2f} | {faster} | {max(p['peaks_mb']):,.0f} | {p['D']:.9g} |")
+    costs = Costs.fitted(points)
+    if costs is None:
+        return lines
+    lines += ["", f"Model: {1e6 * costs.element:.3g} µs a hexahedron and step, {1e6 * costs.exchange:.3g} µs an "
+              f"exchange; in a step {costs.halos:.1f} sums at nodes between parts, {costs.sums:.1f} of numbers, "
+              f"{costs.solves:.2f} solves. Assumed of a cluster: {1e6 * LATENCY:g} µs, {BANDWIDTH / 1e9:g} GB/s.", "",
+              "| hexahedra | ranks | time of a step (ms) | elements | borders | sums | γ to the first rank "
+              "| efficiency |", "|---" * 8 + "|"]
+    for body in BODIES:
+        for count in CLUSTERS:
+            parts = costs.parts(body, count)
+            whole = sum(parts.values())
+            lines.append(f"| {body:,} | {count:,} | {1e3 * whole:.3g} | "
+                         + " | ".join(f"{part / whole:.0%}" for part in parts.values())
+                         + f" | {parts['elements'] / whole:.0%} |")
     return lines
 
 

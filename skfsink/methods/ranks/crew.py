@@ -21,7 +21,7 @@ from ...errors import SkfsinkError
 from ...fields.state import State
 from ...system.peak import peak_rss_mb
 from ..explicit import Explicit
-from .mpi import wait
+from .mpi import MPIExchange, wait
 from .part import PartOfBody, state_of
 
 if TYPE_CHECKING:
@@ -68,6 +68,8 @@ class Member:
         """Take up a part of the body."""
         self.part, self.body = part, part.body(self.comm)
         self.explicit = Explicit(self.body, part.controls)
+        assert isinstance(self.body.space.exchange, MPIExchange)
+        self.exchange = self.body.space.exchange
         self.logged = 0
 
     def begin(self, state: State) -> None:

@@ -89,9 +89,14 @@ class InParts:
         """Solves for gamma in the parts."""
         return self._own.density.solves
 
-    def peaks(self) -> list[float]:
-        """Greatest memory that each rank has used [MB]."""
-        return self.crew.peaks()
+    def cost(self) -> dict[str, Any]:
+        """What each rank has used of memory [MB], and how often they have told each other something.
+
+        `halos` are sums at the nodes between parts, `sums` numbers that all parts give.
+        """
+        exchange = self.crew.member.exchange
+        return {"peak_rss_mb": [round(peak, 1) for peak in self.crew.peaks()], "halos": exchange.halos,
+                "sums": exchange.sums_made, "gamma_iterations": self._own.density.iterations}
 
     def begin(self, state: State) -> None:
         """Set the body in motion."""

@@ -46,6 +46,10 @@ class MPIExchange:
     comm: the ranks.
     part: what this rank has.
     n_nodes: of the whole body.
+
+    Attributes
+    ----------
+    halos, sums_made: sums at the nodes between parts, and numbers gathered from all, so far.
     """
 
     def __init__(self, comm: MPI.Intracomm, part: Numbers, n_nodes: int) -> None:
@@ -56,6 +60,7 @@ class MPIExchange:
         self._turns = sorted([*part.shared, comm.rank])  # ranks in the order in which their shares are added
         self._buffers: dict[int, dict[int, tuple[np.ndarray, np.ndarray]]] = {}
         self._unknowns: dict[int, tuple[np.ndarray, _Unknowns]] = {}
+        self.halos = self.sums_made = 0
 
     def whole(self, x: np.ndarray) -> np.ndarray:
         """Make the shares of nodal values (n,) or (n, k) whole, in place; returns `x`."""
@@ -64,6 +69,7 @@ class MPIExchange:
         if k not in self._buffers:
             self._buffers[k] = {rank: (np.empty((nodes.size, k)), np.empty((nodes.size, k)))
                                 for rank, nodes in self.part.shared.items()}
+        self.halos += 1
         buffers, shared, comm = self._buffers[k], self.part.shared, self.comm
         requests = [comm.Irecv(buffers[rank][1], rank) for rank in shared]
         for rank, nodes in shared.items():
@@ -82,6 +88,7 @@ class MPIExchange:
 
     def _each(self, values: np.ndarray) -> np.ndarray:
         """Values (m,) of each rank, (ranks, m)."""
+        self.sums_made += 1
         found = np.empty((self.comm.size, *values.shape))
         wait(self.comm.Iallgather(np.ascontiguousarray(values, float), found))
         return found
