@@ -43,6 +43,11 @@ def case(*arguments: str | Path) -> list[str | Path]:
     return ["-m", "skfsink.cases.single_edge_notch", *arguments]
 
 
+def case_alone(*arguments: str | Path) -> list[str]:
+    """A command of Python for a run of the notched plate on one rank."""
+    return [sys.executable, *map(str, case(*arguments))]
+
+
 def finished(command: list[str], status: int = 0) -> str:
     """What a command that ends with a status says of errors."""
     done = subprocess.run(command, capture_output=True, text=True, timeout=500, check=False, cwd=HERE.parent)
@@ -109,6 +114,16 @@ def test_an_unknown_solver_of_the_density(tmp_path: Path) -> None:
 def test_parts_add_up_to_the_whole_body(count: int) -> None:
     """Fails if a sum, a copy or a decision differs from that of the whole body on any rank; see `on_ranks.py`."""
     finished(on(count, HERE / "on_ranks.py"))
+
+
+@ranks
+@pytest.mark.parametrize("option, said", [
+    ("--contact", "contact"), ("--kernels=forms", "kernels forms"), ("--sink=consistent", "the consistent sink")])
+def test_what_several_ranks_do_not_know(option: str, said: str, mesh: Path, tmp_path: Path) -> None:
+    """Fails if a body is loaded first, or an option is left out without a word."""
+    text = finished(on(2, *case("--mesh", mesh, *SMALL, option, "--out", tmp_path / "run")), 2)
+    assert text == f"skfsink: several ranks do not know {said}: start it on one rank\n"
+    assert not (tmp_path / "run").exists()
 
 
 @ranks
@@ -197,3 +212,22 @@ def test_a_script_runs_on_the_first_rank(tmp_path: Path) -> None:
     assert finished(on(2, "-m", "skfsink.methods.ranks", script, "a")).count("once ['a']") == 1
     script.write_text("raise ValueError('of the script')\n")
     assert "ValueError: of the script" in finished(on(2, "-m", "skfsink.methods.ranks", script), 1)
+
+
+@ranks
+@pytest.mark.slow
+def test_an_end_of_time_leaves_a_checkpoint(mesh: Path, tmp_path: Path) -> None:
+    """Fails if SIGTERM to `mpiexec` ends ranks before the first one has written, or is not told in one line."""
+    run = tmp_path / "run"
+    with subprocess.Popen(on(2, *case("--mesh", mesh, *ARGUMENTS[:-1], "1e6", "--out", run)),
+                          cwd=HERE.parent, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as program:
+        while not (run / "onset.npz").exists() and program.poll() is None:
+            time.sleep(0.05)
+        time.sleep(1.0)
+        before = (run / "checkpoint.npz").stat().st_mtime_ns
+        program.send_signal(signal.SIGTERM)
+        _, said = program.communicate(timeout=60)
+    assert (run / "checkpoint.npz").stat().st_mtime_ns > before
+    assert said.count("interrupted; go on with skfsink resume") == 1, said
+    finished(case_alone("--resume", run))
+    assert (run / "summary.json").exists()

@@ -7,15 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from ...fields.body import Body
+from ...fields.body import Body, BodyControls
 from ...fields.state import State
+from ...loads.schedule import Loading
 from ..controls import EventControls
 from ..integrators import INTEGRATORS, Integrator
 from .crew import Crew
-from .part import parts_of
+from .part import check_parts, parts_of
+from .partition import check_ranks
 from .world import world
 
-__all__ = ["InParts", "integrator_of", "ranks_text"]
+__all__ = ["InParts", "integrator_of", "ranks_text", "refuse"]
 
 MOVING, DENSITY = ("u", "v", "a", "W_max"), ("gamma", "sink")
 NODAL = {"reaction", "viscous"}  # of the memory of an integrator
@@ -37,6 +39,14 @@ def ranks_text(analysis: str, integrator: str) -> str:
     if (analysis, integrator) == ("dynamic", "explicit"):
         return f"{comm.size} ranks: one loads the body, all of them compute its event"
     return f"{comm.size} ranks: one computes all of it, the others wait; parts know the explicit event alone"
+
+
+def refuse(analysis: str, integrator: str, loading: Loading, controls: BodyControls, elements: int) -> None:
+    """Refuse an event that the ranks that there are cannot compute, before the body is loaded (ParameterError)."""
+    comm = world()
+    if comm is not None and analysis != "quasistatic" and integrator == "explicit":
+        check_ranks(comm.size, elements)
+        check_parts(loading, controls)
 
 
 class InParts:

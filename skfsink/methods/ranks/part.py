@@ -12,7 +12,7 @@ import skfem
 from ...errors import ParameterError
 from ...fem.backend import BulkViscosity
 from ...fem.space import Space
-from ...fields.body import Body
+from ...fields.body import Body, BodyControls
 from ...fields.density import DensitySolver
 from ...fields.momentum import Momentum
 from ...fields.state import State
@@ -61,13 +61,12 @@ class PartOfBody:
         return Body(momentum, density, self.loading, self.deletion)
 
 
-def check_parts(body: Body) -> None:
-    """Refuse a body that cannot be computed in parts (ParameterError)."""
-    loading, momentum = body.loading, body.momentum
-    what = ("contact" if momentum.contact is not None else "pressures and fillings" if loading.followers is not None
+def check_parts(loading: Loading, controls: BodyControls) -> None:
+    """Refuse what parts of a body do not know (ParameterError)."""
+    what = ("contact" if controls.contact else "pressures and fillings" if loading.followers is not None
             else "dead loads" if loading.dead is not None else "planes of an oblique direction" if loading.sliding
-            is not None else "grips that turn" if loading.turns else "kernels forms" if momentum.kernels != "compiled"
-            else "" if body.density.sink != "consistent" else "the consistent sink")
+            is not None else "grips that turn" if loading.turns else "kernels forms" if controls.kernels != "compiled"
+            else "the consistent sink" if controls.sink == "consistent" else "")
     if what:
         raise ParameterError(f"several ranks do not know {what}: start it on one rank")
 
@@ -78,9 +77,8 @@ def parts_of(body: Body, controls: ExplicitControls, ranks: int) -> list[PartOfB
     Raises
     ------
     ParameterError
-        There are more ranks than elements, or something of the body cannot be computed in parts.
+        There are more ranks than elements.
     """
-    check_parts(body)
     space, momentum, density = body.space, body.momentum, body.density
     found = []
     for part in numbers(space.conn, partition(space.conn, ranks)):

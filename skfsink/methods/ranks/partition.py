@@ -9,7 +9,7 @@ from scipy.sparse import csr_array
 
 from ...errors import ParameterError
 
-__all__ = ["Numbers", "numbers", "partition"]
+__all__ = ["Numbers", "check_ranks", "numbers", "partition"]
 
 
 @dataclass(frozen=True)
@@ -30,6 +30,12 @@ class Numbers:
     shared: dict[int, np.ndarray]
 
 
+def check_ranks(ranks: int, elements: int) -> None:
+    """Refuse more ranks than elements (ParameterError)."""
+    if ranks > elements:
+        raise ParameterError(f"{ranks} ranks cannot share {elements} elements: start at most as many ranks as elements")
+
+
 def partition(conn: np.ndarray, parts: int) -> np.ndarray:
     """Number of the part of each element (ne,), of `parts`, for the nodes of the elements `conn` (ne, na).
 
@@ -39,8 +45,7 @@ def partition(conn: np.ndarray, parts: int) -> np.ndarray:
         There are more parts than elements, or METIS is not there.
     """
     ne, na = conn.shape
-    if parts > ne:
-        raise ParameterError(f"{parts} ranks cannot share {ne} elements: start at most as many ranks as elements")
+    check_ranks(parts, ne)
     if parts == 1:
         return np.zeros(ne, np.int64)
     try:
