@@ -55,7 +55,7 @@ class PartOfBody:
 
     def body(self, comm: MPI.Intracomm) -> Body:
         """The part as a body whose balances tell the others what they have to."""
-        space = Space(self.mesh, MPIExchange(comm, self.numbers, self.n_nodes))
+        space = Space(self.mesh, exchange=MPIExchange(comm, self.numbers, self.n_nodes))
         momentum = Momentum(space, self.material, regions=self.regions, **self.momentum)
         density = DensitySolver(space, self.sink_law, regions=self.regions, solver="jacobi", **self.density)
         return Body(momentum, density, self.loading, self.deletion)
