@@ -246,11 +246,11 @@ def test_smoother_suits_tall_hexes():
     """Fails if the Jacobi weight does not follow the spectral radius: past 2 over it conjugate gradients stall."""
     space = Space(distorted(grid("hex", (24, 24, 2), (0.5, 0.5, 0.2)), 0.1))  # five times as tall as wide
     solver = DensitySolver(space, LAW, gradient="gauss")
-    assert 0.6 < solver._amg.omega < 0.75
+    assert 0.6 < solver._iterative.omega < 0.75
     gamma = solver.solve(crack(space), np.ones(space.n_nodes))
     assert 0 < gamma.min() < 1e-14 and solver.fallbacks == 0 and solver.iterations <= 35
-    assert DensitySolver(box("quad", 8, 0.2), LAW)._amg.omega == solver._amg.OMEGA  # squares need no less
+    assert DensitySolver(box("quad", 8, 0.2), LAW)._iterative.omega == solver._iterative.OMEGA  # squares need no less
     monotone = DensitySolver(space, LAW)  # rows of an M-matrix: the radius is at most 2
-    assert monotone._amg.omega == solver._amg.OMEGA
+    assert monotone._iterative.omega == solver._iterative.OMEGA
     monotone.solve(crack(space), np.ones(space.n_nodes))
     assert monotone.fallbacks == 0 and monotone.iterations <= 38

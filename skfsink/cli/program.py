@@ -13,6 +13,7 @@ from cyclopts import App, ArgumentCollection, Group
 from cyclopts.exceptions import CycloptsError, UnknownCommandError
 
 from ..errors import Interrupted, SkfsinkError
+from ..methods.ranks.world import first, world
 from ..system.version import __version__
 
 __all__ = ["command", "run"]
@@ -41,6 +42,19 @@ def run(app: App, arguments: list[str] | None, given_names: Collection[str] = ()
 
     `given_names` of options, complete when the call is made, go into the options of a case.
     """
+    try:
+        comm = world()
+    except SkfsinkError as error:
+        if first():
+            print("skfsink:", error, file=sys.stderr)
+        raise SystemExit(BAD_INPUT) from None
+    if comm is None:
+        _run(app, arguments, given_names)
+    from ..methods.ranks.crew import lead
+    lead(comm, lambda: _run(app, arguments, given_names))
+
+
+def _run(app: App, arguments: list[str] | None, given_names: Collection[str]) -> NoReturn:
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends a run as Ctrl-C does
     try:
         call, bound, _ = app.parse_args(arguments, exit_on_error=False, print_error=False)

@@ -13,6 +13,7 @@ from scipy.sparse import csc_array, csr_array
 
 from ..system.jit import njit
 from .direct import unsigned
+from .exchange import ALONE
 
 __all__ = ["AmgCG", "residual"]
 
@@ -30,6 +31,7 @@ class AmgCG:
     call.
     """
 
+    exchange = ALONE
     DEAD = 3.0           # of the intact diagonal
     OMEGA = 0.8          # greatest Jacobi weight of the smoother
     STABLE = 1.6         # that weight times the spectral radius of D^-1 A at the most; past 2 it would not smooth
@@ -97,6 +99,20 @@ class AmgCG:
         """Mask of the unknowns whose sink has grown so far that the coarse level leaves them out."""
         return self.DEAD * self._diagonal0 <= D
 
+    def sharp(self, tolerance: float | None) -> float:
+        """The relative residual at which a solve to a tolerance, that of the solver if not given, ends."""
+        return tolerance or self.tolerance
+
+    def residual_of(self, A: csr_array, x: np.ndarray, b: np.ndarray) -> np.ndarray:
+        """b - A x."""
+        return residual(A, x, b)
+
+    def settle(self, A: csr_array, D: np.ndarray, b: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """Let the values of `x` at dead unknowns follow their sinks, in place; returns the residual."""
+        r = residual(A, x, b)
+        _settle(self.dead(D), D, unsigned(A), x, r)
+        return r
+
     def solve(self, A: csr_array, D: np.ndarray, b: np.ndarray, x: np.ndarray,
               tolerance: float | None = None) -> np.ndarray | None:
         """Solution of A x = b from the guess `x`; None if it did not converge in `max_iterations`.
@@ -104,7 +120,7 @@ class AmgCG:
         `D` is the diagonal of A. It ends at a residual of `tolerance` (that of the solver if not given) relative to
         the norm of b.
         """
-        tolerance, size = tolerance or self.tolerance, float(np.linalg.norm(b))
+        tolerance, size = self.sharp(tolerance), float(np.linalg.norm(b))
         # one Jacobi sweep puts the unknowns with a huge diagonal where they belong
         x = x + residual(A, x, b) / D
         total = 0
@@ -179,6 +195,18 @@ def _row(indptr, indices, data, x, i):  # type: ignore[no-untyped-def]
     for k in range(indptr[i], indptr[i + 1]):
         total += data[k] * x[indices[k]]
     return total
+
+
+@njit(cache=True)
+def _settle(dead, D, A, x, r):  # type: ignore[no-untyped-def]
+    """Let the values at `dead` nodes follow their sinks, and the residual r with them (A is symmetric)."""
+    indptr, indices, data = A.indptr, A.indices, A.data
+    for i in range(x.size):
+        if dead[i]:
+            change = r[i] / D[i]
+            x[i] += change
+            for k in range(indptr[i], indptr[i + 1]):
+                r[indices[k]] -= data[k] * change
 
 
 @njit(cache=True)

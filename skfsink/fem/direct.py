@@ -49,6 +49,10 @@ class Factorization:
     PARDISO is told that the matrix is positive definite; where it is not, it is factorised again as indefinite.
     """
 
+    exact = True     # whether `apply` is a solution in no time
+    MOST = (5, 12)   # iterations of `conjugate` that pay, in two and in three dimensions
+    WORTH = (10, 24)  # that take as long as a factorisation, on a body of 50,000 elements
+
     def __init__(self, pattern: Pattern, backend: str | None = None, threads: int = 1) -> None:
         self.pattern = pattern
         self.backend = backend or ("pardiso" if pypardiso is not None else "superlu")

@@ -25,6 +25,7 @@ from scipy.sparse import coo_array, csr_array
 
 from ..errors import MeshError, place_text
 from ..system.jit import njit
+from .exchange import ALONE, Exchange
 from .quadrature import AXES, points, shape_functions
 
 __all__ = ["Space", "node_key"]
@@ -41,6 +42,7 @@ class Space:
     ----------
     mesh: scikit-fem `MeshQuad` or `MeshHex`, coordinates in mm.
     axisymmetric: whether the quadrilaterals are the half plane x >= 0 of a body of revolution about the y axis.
+    exchange: with the other parts of the body, if this is one of several.
 
     Raises
     ------
@@ -51,6 +53,7 @@ class Space:
 
     mesh: skfem.Mesh
     axisymmetric: bool = False
+    exchange: Exchange = ALONE
     X: np.ndarray = field(init=False)      #: nodal coordinates [mm], (n, dim)
     conn: np.ndarray = field(init=False)   #: nodes of the elements, lexicographic, (ne, na)
     N: np.ndarray = field(init=False)      #: shape functions at the Gauss points, (nq, na)
@@ -236,7 +239,7 @@ class Space:
         """Row sums of the mass matrix with weight `values` (ne, nq):  sum_q w_q values_q N_a(q), (n,)."""
         out = np.zeros(self.n_nodes)
         _lump(self.w, np.ascontiguousarray(values, float), self.nodes, self.N, out)
-        return out
+        return self.exchange.whole(out)
 
     @cached_property
     def nodes(self) -> np.ndarray:

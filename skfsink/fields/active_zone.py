@@ -19,8 +19,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.sparse import csr_array
 
-from ..fem.amg import AmgCG, residual
-from ..fem.direct import unsigned
+from ..fem.amg import AmgCG
+from ..fem.jacobi import JacobiCG
 from ..system.jit import njit
 
 __all__ = ["ActiveZone", "Zone"]
@@ -38,7 +38,7 @@ class Zone(NamedTuple):
 
     depth: np.ndarray
     nodes: np.ndarray
-    inner: AmgCG
+    inner: AmgCG | JacobiCG
 
 
 class ActiveZone:
@@ -52,7 +52,7 @@ class ActiveZone:
     ----------
     X: nodal coordinates [mm], (n, dim).
     length_scale: the characteristic length l [mm].
-    amg: the solver of the whole system; the zone uses its part of the hierarchy.
+    solver: of the whole system; the zone uses its part of the hierarchy, if it has one.
 
     Attributes
     ----------
@@ -70,11 +70,17 @@ class ActiveZone:
     PASSES = 3       # zones one after the other in a solve
     SHARE = 0.7      # of the target for the solve in a zone; the rest is for what is left outside
 
-    def __init__(self, X: np.ndarray, length_scale: float, amg: AmgCG) -> None:
-        self._l, self._amg = length_scale, amg
-        width = self.CELL * length_scale
-        cells, cell = np.unique(np.floor(X / width), axis=0, return_inverse=True)
-        self._centres, self._cell = width * np.ascontiguousarray(cells), cell.ravel()
+    def __init__(self, X: np.ndarray, length_scale: float, solver: AmgCG | JacobiCG) -> None:
+        self._l, self._solver, self._exchange = length_scale, solver, solver.exchange
+        width, exchange = self.CELL * length_scale, solver.exchange
+        own, cell = np.unique(np.floor(X / width), axis=0, return_inverse=True)
+        cells, places = np.unique(exchange.all(own), axis=0, return_inverse=True)  # those of the whole body
+        first = int(exchange.all(np.array([len(own)]))[:exchange.number].sum())
+        self._centres = width * np.ascontiguousarray(cells)
+        self._cell = places.ravel()[first:first + len(own)][cell.ravel()]
+        self._counted = np.zeros(len(X), bool)
+        self._counted[exchange.counted] = True
+        self._size = exchange.total(int(self._counted.sum()))
         self.solves = self.misses = self.choices = 0
         self.residual = 0.0
 
@@ -85,9 +91,10 @@ class ActiveZone:
         One that does not is the best guess for a solve everywhere. `zones` are those of the solves before, the one
         used last at the end; so are those returned.
         """
-        size, x, r = float(np.linalg.norm(b)), x.copy(), residual(A, x, b)
-        _settle(self._amg.dead(D), D, unsigned(A), x, r)
-        self.residual = float(np.linalg.norm(r)) / size
+        norm, x = self._exchange.norm, x.copy()
+        tolerance, size = self._solver.sharp(tolerance), norm(b)
+        r = self._solver.settle(A, D, b, x)
+        self.residual = norm(r) / size
         if self.residual <= tolerance:
             return x, True, 0, zones
         total = 0
@@ -100,8 +107,8 @@ class ActiveZone:
             total += zone.inner.iterations
             if not converged:
                 return x, False, total, zones
-            r = residual(A, x, b)
-            self.residual = float(np.linalg.norm(r)) / size
+            r = self._solver.residual_of(A, x, b)
+            self.residual = norm(r) / size
             if self.residual <= 2 * tolerance:
                 self.solves += 1
                 return x, True, total, zones
@@ -110,14 +117,16 @@ class ActiveZone:
 
     def _find(self, r: np.ndarray, target: float, zones: tuple[Zone, ...]) -> Zone | None:
         """The smallest of `zones` that is deep enough for the residual `r`, or a new one; None if that is too large."""
-        need = np.zeros(len(self._centres))
-        _reach(r, self._cell, target, self.RADIUS * self._l, self.DECADE * self._l, need)
+        need, exchange = np.zeros(len(self._centres)), self._exchange
+        level = _level(exchange.sums(_squares(r, self._counted, target)), target)
+        _reach(r, self._cell, (level, target), self.RADIUS * self._l, self.DECADE * self._l, need)
+        need = exchange.maxima(need)
         fit = [zone for zone in zones if (zone.depth >= need).all()]
         if fit:
             return min(fit, key=lambda zone: zone.nodes.size)
         depth = np.zeros_like(need)
         _deepen(self._centres, np.flatnonzero(need), need, self.MARGIN * self._l, depth)
-        if np.count_nonzero(depth[self._cell]) > self.MOST * self._cell.size:
+        if exchange.total(int(np.count_nonzero(depth[self._cell[self._counted]]))) > self.MOST * self._size:
             return None
         self.choices += 1
         return self.of_depth(depth)
@@ -125,32 +134,33 @@ class ActiveZone:
     def of_depth(self, depth: np.ndarray) -> Zone:
         """The zone with these depths of the cells [mm], as a checkpoint keeps them."""
         nodes = np.flatnonzero(depth[self._cell])
-        return Zone(depth, nodes, self._amg.restricted(nodes))
+        return Zone(depth, nodes, self._solver.restricted(nodes))
 
 
 @njit(cache=True)
-def _settle(dead, D, A, x, r):  # type: ignore[no-untyped-def]
-    """Let the values at `dead` nodes follow their sinks, and the residual r with them (A is symmetric)."""
-    indptr, indices, data = A.indptr, A.indices, A.data
-    for i in range(x.size):
-        if dead[i]:
-            change = r[i] / D[i]
-            x[i] += change
-            for k in range(indptr[i], indptr[i + 1]):
-                r[indices[k]] -= data[k] * change
+def _squares(r, counted, target):  # type: ignore[no-untyped-def]
+    """Sums of squares of the residuals that count, by powers of two, from 2^-48 of the target on."""
+    squares = np.zeros(64)
+    for i in range(r.size):
+        if counted[i]:
+            squares[min(max(math.frexp(r[i] / target)[1] + 48, 0), 63)] += r[i] * r[i]
+    return squares
 
 
 @njit(cache=True)
-def _reach(r, cell, target, radius, decade, need):  # type: ignore[no-untyped-def]
-    """Depth that the residual needs in each cell, but for its smallest values, whose norm is half of the target."""
-    squares = np.zeros(64)  # sums by powers of two, from 2^-48 of the target on
-    for value in r:
-        squares[min(max(math.frexp(value / target)[1] + 48, 0), 63)] += value * value
+def _level(squares, target):  # type: ignore[no-untyped-def]
+    """Residual below which the norm of all is half of the target."""
     power, rest = 0, squares[0]
     while power < 63 and rest + squares[power + 1] <= 0.25 * target * target:
         power += 1
         rest += squares[power]
-    level = 2.0 ** (power - 48) * target
+    return 2.0 ** (power - 48) * target
+
+
+@njit(cache=True)
+def _reach(r, cell, sizes, radius, decade, need):  # type: ignore[no-untyped-def]
+    """Depth that the residual needs in each cell, where it is at least the level; `sizes` are level and target."""
+    level, target = sizes
     for i in range(r.size):
         if abs(r[i]) >= level:
             need[cell[i]] = max(need[cell[i]], radius + decade * np.log10(abs(r[i]) / target))

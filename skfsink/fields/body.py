@@ -45,6 +45,10 @@ class BodyControls(Protocol):
         """Name in :data:`.GRADIENTS`."""
 
     @property
+    def density_solver(self) -> str:
+        """Name in :data:`.SOLVERS`."""
+
+    @property
     def active_zone(self) -> bool:
         """Whether gamma is solved for only where it changes."""
 
@@ -158,8 +162,8 @@ class Body:
         if controls.contact:
             momentum.contact = Contact(space, momentum.parts, loading.free)
         density = DensitySolver(space, scene.sink_law, controls.sink, active_zone=controls.active_zone,
-                                regions=scene.regions, kernels=controls.kernels, gradient=controls.gradient,
-                                absent=scene.cut)
+                                solver=controls.density_solver, regions=scene.regions, kernels=controls.kernels,
+                                gradient=controls.gradient, absent=scene.cut)
         return cls(momentum, density, loading, controls.deletion, threads, scene.broken)
 
     @property
@@ -186,7 +190,7 @@ class Body:
     def wave_speed_at_failure(self) -> float:
         """Greatest speed of :func:`.wave_speed_at_failure` among the materials [m/s]."""
         pairs = zip(self.momentum.parts, self.density.parts, strict=True)
-        return max(wave_speed_at_failure(part.material, law) for part, (_, law) in pairs)
+        return self.space.exchange.greatest(max(wave_speed_at_failure(part.material, law) for part, (_, law) in pairs))
 
     # --- initial cracks ---
     def begin(self, state: State | None = None) -> State:

@@ -27,10 +27,12 @@ def delete_failed(space: Space, state: State, threshold: float, failure_energy: 
     if failed.size:
         state.deleted[failed] = True
         state.deletions.extend((state.time, int(e)) for e in failed)
+    if space.exchange.total(failed.size):
         if isinstance(failure_energy, np.ndarray):
-            state.ledger.paper += float(failure_energy[failed] @ space.V[failed])
+            used = float(failure_energy[failed] @ space.V[failed])
         else:
-            state.ledger.paper += failure_energy * float(space.V[failed].sum())
+            used = failure_energy * float(space.V[failed].sum())
+        state.ledger.paper += space.exchange.total(used)
     return failed
 
 
@@ -56,9 +58,10 @@ def left_in(momentum: Momentum, gamma: np.ndarray, failed: np.ndarray) -> float:
     with the defaults: elements that fail bear no force any more.
     """
     at_gauss = momentum.effective(gamma, np.zeros(momentum.space.n_elements, bool))[failed]
-    if not at_gauss.any():
-        return 0.0
-    return float(np.einsum("eq,eq,eq->", momentum.space.w[failed], at_gauss, momentum.W[failed]))
+    left = 0.0
+    if at_gauss.any():
+        left = float(np.einsum("eq,eq,eq->", momentum.space.w[failed], at_gauss, momentum.W[failed]))
+    return momentum.space.exchange.total(left)
 
 
 @njit(cache=True)

@@ -20,6 +20,7 @@ from ..errors import ConvergenceError, choose
 from ..fem.amg import AmgCG
 from ..fem.backends import backend
 from ..fem.direct import Factorization
+from ..fem.jacobi import JacobiCG
 from ..fem.pattern import Pattern
 from ..fem.space import Space
 from ..material import SinkLaw
@@ -28,12 +29,14 @@ from ..system.jit import njit
 from .active_zone import ActiveZone, Zone
 from .sinks import SINKS
 
-__all__ = ["GRADIENTS", "Density", "DensitySolver"]
+__all__ = ["GRADIENTS", "SOLVERS", "Density", "DensitySolver"]
 
 log = logging.getLogger(__name__)
 
 #: matrices of the gradient term: without positive off-diagonals (see :mod:`.gradient`), or as integrated by Gauss
 GRADIENTS = ("monotone", "gauss")
+#: of sinks that stay on the diagonal: conjugate gradients with multigrid, or with the diagonal alone
+SOLVERS = ("multigrid", "jacobi")
 
 
 class Density(NamedTuple):
@@ -68,6 +71,7 @@ class DensitySolver:
     sink: one of :data:`.SINKS`.
     unchanged: a solve is left out when no sink coefficient moved by more than this, relatively, since the last one.
     active_zone: solves with a tolerance of their own are made where gamma changes (see :mod:`.active_zone`).
+    solver: one of :data:`SOLVERS`; that of a body in several parts is "jacobi".
     regions: elements with limiters of their own; the length l and epsilon are those of `law`.
     kernels: what evaluates the weak forms, a name in :data:`.BACKENDS`.
     absent: numbers of elements that the balance leaves out, as if the mesh had a cut there; gamma is 0 at their nodes
@@ -84,12 +88,15 @@ class DensitySolver:
     """
 
     def __init__(self, space: Space, law: SinkLaw, sink: str = "lumped", *, tolerance: float = 1e-8,
-                 unchanged: float = 1e-12, active_zone: bool = True, regions: Sequence[Region] = (),
+                 unchanged: float = 1e-12, active_zone: bool = True, solver: str = "multigrid",
+                 regions: Sequence[Region] = (),
                  kernels: str = "compiled", gradient: str = "monotone",
                  absent: np.ndarray | None = None) -> None:
         choose("sink", sink, SINKS)
         choose("gradient", gradient, GRADIENTS)
+        choose("density_solver", solver, SOLVERS)
         self.space, self.law, self.sink, self._quadrature = space, law, sink, SINKS[sink]
+        self.gradient = gradient
         self.unchanged = unchanged
         check_lengths(law, regions)
         ne = space.n_elements
@@ -107,10 +114,17 @@ class DensitySolver:
         self._laplacian = self.backend.laplacian(self._assembled, monotone=self._bounded)
         self._laplacian[self.pattern.diagonal[self.load == 0.0]] = 1.0
         self._data, self._laplacian_diagonal = self._laplacian.copy(), self._laplacian[self.pattern.diagonal]
+        self._counted = np.zeros(space.n_nodes)
+        self._counted[space.exchange.counted] = 1.0
         self._direct: Factorization | None = None
-        self._amg = AmgCG(self.pattern.matrix(self._assemble(np.ones_like(space.w))), tolerance)
-        looks_in_zones = active_zone and self._quadrature.monotone
-        self.zone = ActiveZone(space.X, law.length_scale, self._amg) if looks_in_zones else None
+        self.zone: ActiveZone | None = None
+        if solver == "jacobi" and self._quadrature.monotone:
+            intact = self._assemble(np.ones_like(space.w))[self.pattern.diagonal]
+            self._iterative: AmgCG | JacobiCG = JacobiCG(space.exchange, space.exchange.whole(intact), tolerance)
+        else:
+            self._iterative = AmgCG(self.pattern.matrix(self._assemble(np.ones_like(space.w))), tolerance)
+        if active_zone and self._quadrature.monotone:
+            self.zone = ActiveZone(space.X, law.length_scale, self._iterative)
         self._residual = 0.0
         self.solves = self.skipped = self.iterations = self.fallbacks = 0
 
@@ -122,7 +136,8 @@ class DensitySolver:
     @property
     def _error(self) -> float:
         """Bound of the error of gamma: A^-1 is positive, and A carries gamma = 1 to at least the load."""
-        return 1e-9 + self._residual * float(np.linalg.norm(self.load) / self.load[self.load > 0.0].min())
+        exchange, least = self.space.exchange, float(self.load[self.load > 0.0].min(initial=np.inf))
+        return 1e-9 + self._residual * float(exchange.norm(self.load) / -exchange.greatest(-least))
 
     @property
     def factorisations(self) -> int:
@@ -145,23 +160,26 @@ class DensitySolver:
             The history is not finite, or the solution with a sink on the diagonal leaves (0, 1] by more than its error:
             with the gradient "gauss" on some meshes, with "monotone" on none but by rounding.
         """
-        if not np.isfinite(W_max.max()):  # infinite, it would make a dead point in silence
+        exchange = self.space.exchange
+        if not np.isfinite(exchange.greatest(float(W_max.max()))):  # infinite, it would make a dead point in silence
             raise ConvergenceError("the stored energy of a Gauss point is not finite")
         sink = self.coefficients(W_max)
-        if before.sink is not None and not _changed(sink, before.sink, self.unchanged):
+        if before.sink is not None and not exchange.total(_changed(sink, before.sink, self.unchanged)):
             self.skipped += 1
             return before
         self.solves += 1
         data = self._assemble(sink)
         result, zones = None, before.zones
         if self._quadrature.monotone or sink.max() < 1e3 * sink.min():
-            result, zones = self._iterate(self.pattern.matrix(data), data[self.pattern.diagonal], before, tolerance)
+            diagonal = exchange.whole(data[self.pattern.diagonal])
+            result, zones = self._iterate(self.pattern.matrix(data), diagonal, before, tolerance)
         if result is None:
             result = self._factorise(data)
-        if self._quadrature.monotone and not (-self._error < result.min() and result.max() < 1 + self._error):
+        least, most = -exchange.greatest(-float(result.min())), exchange.greatest(float(result.max()))
+        if self._quadrature.monotone and not (-self._error < least and most < 1 + self._error):
             why = ("its equation was not solved accurately enough" if self._bounded else "the mesh has elements so "
                    "tall, flat or distorted that gradient gauss has no maximum principle: take gradient monotone")
-            raise ConvergenceError(f"the relative density left (0, 1]: {result.min():.3g} to {result.max():.6g}; {why}")
+            raise ConvergenceError(f"the relative density left (0, 1]: {least:.3g} to {most:.6g}; {why}")
         return Density(result, sink, zones)
 
     def coefficients(self, W_max: np.ndarray) -> np.ndarray:
@@ -175,7 +193,13 @@ class DensitySolver:
 
     def _iterate(self, A: csr_array, D: np.ndarray, before: Density,
                  tolerance: float | None) -> tuple[np.ndarray | None, tuple[Zone, ...]]:
-        """Solution by AMG-CG, in the active zone where that is enough, None if it did not converge; and the zones."""
+        """Solution by iteration, in the active zone where that is enough, None if it did not converge; and the zones.
+
+        Raises
+        ------
+        ConvergenceError
+            It did not converge, and the solver has no multigrid.
+        """
         gamma, zones = before.gamma, before.zones
         if self.zone is not None and tolerance is not None:
             gamma, met, iterations, zones = self.zone.solve(A, D, self.load, gamma, tolerance, zones=zones)
@@ -183,15 +207,20 @@ class DensitySolver:
             self._residual = self.zone.residual
             if met:
                 return gamma, zones
-        result = self._amg.solve(A, D, self.load, gamma, tolerance)
-        self.iterations += self._amg.iterations
-        self._residual = self._amg.residual
+        solver = self._iterative
+        result = solver.solve(A, D, self.load, gamma, tolerance)
+        self.iterations += solver.iterations
+        self._residual = solver.residual
+        if result is None and isinstance(solver, JacobiCG):
+            raise ConvergenceError(f"no density in {solver.max_iterations} conjugate gradients with the diagonal, of "
+                                   f"a residual of {solver.residual:.2g}: take density_solver multigrid, on one rank")
         return result, zones
 
     def _assemble(self, sink: np.ndarray) -> np.ndarray:
+        """Data of the matrix, in a part of a body its share of it."""
         if not self._quadrature.monotone:
             return self._laplacian + self._quadrature.assemble(self._assembled, self.backend, sink)
-        self._data[self.pattern.diagonal] = self._laplacian_diagonal + self._lump(sink)
+        self._data[self.pattern.diagonal] = self._laplacian_diagonal + self._lump(sink) * self._counted
         return self._data  # one array for all solves: only the diagonal changes
 
     def _lump(self, values: np.ndarray) -> np.ndarray:
@@ -206,7 +235,7 @@ class DensitySolver:
         if self._direct is None:
             if self._quadrature.monotone:
                 log.warning("conjugate gradients on the %s sink did not converge in %d iterations; factorising",
-                            self.sink, self._amg.max_iterations)
+                            self.sink, self._iterative.max_iterations)
             else:
                 log.warning("the %s sink varies by more than 1e3 inside an element, where conjugate gradients stall; "
                             "factorising instead", self.sink)

@@ -53,10 +53,15 @@ def fragments(space: Space, gamma: np.ndarray, deleted: np.ndarray, length_scale
 def debris(space: Space, gamma: np.ndarray, deleted: np.ndarray, held: np.ndarray, length_scale: float) -> np.ndarray:
     """Numbers of the elements of pieces smaller than l, joined above `SPENT`, without a node that is `held` (n,)."""
     alive, piece = pieces_at(space, gamma, deleted, SPENT)
-    if not alive.size:
-        return alive
-    small = np.bincount(piece, space.extent[alive]) < length_scale**space.dim
-    small[piece[held[space.conn[alive]].any(axis=1)]] = False
+    own, holds = np.zeros(space.n_nodes, np.int64), np.zeros(space.n_nodes, bool)
+    of_nodes = space.conn[alive]
+    own[of_nodes], holds[of_nodes] = piece[:, None], True
+    holds &= gamma > SPENT
+    whole, count = space.exchange.same(own, int(piece.max(initial=-1)) + 1, holds)
+    piece = whole[piece]
+    volume = space.exchange.sums(np.bincount(piece, space.extent[alive], count))
+    kept = space.exchange.sums(np.bincount(piece[held[of_nodes].any(axis=1)], minlength=count))
+    small = (volume < length_scale**space.dim) & (kept == 0)
     return alive[small[piece]]
 
 

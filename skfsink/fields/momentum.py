@@ -70,15 +70,18 @@ class Momentum:
         made = check_element(element, space, kernels)
         self.plane_stress, self.j_bar = made.thin_sheet, made.j_bar
         self.space, self.material, self.element, self.force_floor = space, material, element, force_floor
+        self.regions, self.kernels = tuple(regions), kernels
         self.parts = self._divide(regions)
         materials = [part.material for part in self.parts]
         self.backend = backend(kernels).momentum(space, self.parts, element, threads=threads,
                                                   bulk_viscosity=bulk_viscosity)
         self.bulk_viscosity = bulk_viscosity
-        self.is_viscous = any(bulk_viscosity) or any(m.viscosity > 0.0 for m in materials)
+        greatest = space.exchange.greatest
+        self.is_viscous = any(bulk_viscosity) or greatest(max(m.viscosity for m in materials)) > 0.0
         self.compression = 0.0
         moduli, speeds = [m.shear_modulus for m in materials], [m.shear_wave_speed for m in materials]
-        self.shear_moduli, self.shear_wave_speeds = (min(moduli), max(moduli)), (min(speeds), max(speeds))
+        self.shear_moduli = -greatest(-min(moduli)), greatest(max(moduli))
+        self.shear_wave_speeds = -greatest(-min(speeds)), greatest(max(speeds))
         rho0 = by_element(space.n_elements, material.rho0, regions, lambda region: region.material.rho0)
         self.rho0 = rho0[:, None] if isinstance(rho0, np.ndarray) else rho0
         self.energy = self.loads = 0.0
@@ -150,7 +153,7 @@ class Momentum:
                 self.dead.weigh(self.effective(gamma, deleted))
         if self.followers is not None:
             self.followers.keep(gamma, deleted, self.force_floor)
-        taken = self.backend.relax(gamma, deleted, self.force_floor)
+        taken = self.space.exchange.total(self.backend.relax(gamma, deleted, self.force_floor))
         if self.contact is not None:
             self._mass = self._lumped(self.gamma)
             if medium:
@@ -239,8 +242,10 @@ class Momentum:
         """
         out = np.empty_like(self.space.X) if out is None else out
         placed = u if self.contact is None else self.contact.place(u)
-        self.least_J = self.backend.force(u, out)
-        self.energy = self.backend.energy
+        exchange, least = self.space.exchange, self.backend.force(u, out)
+        self.least_J = -exchange.greatest(-least)
+        self.energy = exchange.total(self.backend.energy)
+        exchange.whole(out)
         if self.dead is not None:
             out[self.dead.nodes] -= self.dead.values
             self.loads = self.dead.potential(u)
@@ -257,8 +262,8 @@ class Momentum:
         Its power with `v` is never negative. Sets `compression`.
         """
         out = np.empty_like(self.space.X) if out is None else out
-        self.compression = self.backend.viscous_force(u, v, out)
-        return out
+        self.compression = self.space.exchange.greatest(self.backend.viscous_force(u, v, out))
+        return self.space.exchange.whole(out)
 
     def unheld(self, x: np.ndarray) -> np.ndarray:
         """Forces or displacements (n, dim) without what planes on which nodes slide take; `x` itself without these."""
@@ -295,7 +300,7 @@ class Momentum:
         The greatest Rayleigh quotient of what each element resists most: a change of volume, or of area in plane
         stress. `inverse_mass` (n, dim) is zero where a degree of freedom is held.
         """
-        return self.backend.stiffest(u, inverse_mass)
+        return self.space.exchange.greatest(self.backend.stiffest(u, inverse_mass))
 
     def consistent_mass(self, pattern: Pattern) -> np.ndarray:
         """Data of the mass matrix of Eq. (28) on `pattern`."""

@@ -51,7 +51,7 @@ class Nearest(Sink):
 
     def sums(self, space: Space, backend: DensityBackend, values: np.ndarray) -> np.ndarray:
         """Sums of w values over the Gauss points of a node."""
-        return np.bincount(space.conn.ravel(), (space.w * values).ravel(), space.n_nodes)
+        return space.exchange.whole(np.bincount(space.conn.ravel(), (space.w * values).ravel(), space.n_nodes))
 
 
 class Consistent(Lumped):

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from copy import deepcopy
 from dataclasses import asdict, dataclass, field, fields
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,7 +22,8 @@ class State:
     A field that is added here is copied, kept in a checkpoint and read from it without being named anywhere else: it
     has to be an array, None, or of plain values as JSON has them.
 
-    Memory: it is the memory of a run: `begin_event` changes it, `stored` gives all of it.
+    Memory: it is the memory of a run: `begin_event` changes it, `stored` gives all of it, `put_off` lets a part
+    of it be elsewhere.
 
     Attributes
     ----------
@@ -44,7 +46,7 @@ class State:
     gamma: np.ndarray
     W_max: np.ndarray
     deleted: np.ndarray
-    sink: np.ndarray | None = None
+    sink: np.ndarray | None = field(default_factory=lambda: None)
     deletions: list[tuple[float, int]] = field(default_factory=list)
     grip: float = 0.0
     time: float = 0.0
@@ -58,6 +60,21 @@ class State:
         zero = np.zeros_like(space.X)
         return cls(zero, zero.copy(), zero.copy(), np.ones(space.n_nodes), np.zeros_like(space.w),
                    np.zeros(space.n_elements, bool))
+
+    # --- fields that are elsewhere ---
+    def put_off(self, *names: str, fetch: Callable[[str], Any]) -> None:
+        """Let fields be fetched by their names when they are asked for; what there was of them is forgotten."""
+        for name in names:
+            self.__dict__.pop(name, None)
+            self.__dict__.setdefault("_elsewhere", {})[name] = fetch
+
+    if not TYPE_CHECKING:
+        def __getattr__(self, name: str) -> Any:
+            elsewhere = self.__dict__.get("_elsewhere", {})
+            if name not in elsewhere:
+                raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+            value = self.__dict__[name] = elsewhere.pop(name)(name)
+            return value
 
     def copy(self) -> State:
         """An independent copy, to start another analysis from."""

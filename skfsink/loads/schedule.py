@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
+from copy import copy
 
 import numpy as np
 
@@ -124,6 +125,16 @@ class Loading:
         loading = cls(space, ())
         loading.free, loading._steady = loading.free & free, velocity
         return loading
+
+    def of_nodes(self, nodes: np.ndarray) -> Loading:
+        """The same for some `nodes` (m,) of a body, by their numbers among these; of grips that do not turn alone."""
+        part, here = copy(self), np.full(self._shape[0], -1)
+        here[nodes] = np.arange(nodes.size)
+        part._shape = nodes.size, self._shape[1]
+        part.free = np.ascontiguousarray(self.free.reshape(self._shape)[nodes]).ravel()
+        part._moves = [(own[own >= 0], i, value) for held, i, value in self._moves for own in (here[held],)]
+        part._steady = None if self._steady is None else np.ascontiguousarray(self._steady[nodes])
+        return part
 
     def knot(self, t: float) -> float:
         """The next knot after load time `t`, infinity if there is none [s]."""

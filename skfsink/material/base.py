@@ -52,6 +52,9 @@ class Material:
         """Constants of the isochoric law, as `law` expects them."""
         raise NotImplementedError
 
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if name != "compiled_law"}  # an address, of here
+
     @cached_property
     def compiled_law(self) -> CompiledLaw:
         """`law` as the element loops take it."""

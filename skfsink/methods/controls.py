@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from ..errors import choose, require
+from ..fem.linear import LINEAR
 
 __all__ = ["COUPLINGS", "DEBRIS", "MASSES", "EventControls", "ExplicitControls", "HHTControls", "StaticsControls"]
 
@@ -125,6 +126,7 @@ class StaticsControls:
     onset_tolerance: width of the last bisection interval of the onset, relative to the load, in (0, 0.1].
     max_newton: Newton steps after which an equilibrium is given up, >= 3.
     max_passes: passes over the two fields after which a load increment is given up, >= 3.
+    linear: what solves for displacements, a name in :data:`.LINEAR`.
     """
 
     tolerance: float = 1e-7
@@ -134,6 +136,7 @@ class StaticsControls:
     onset_tolerance: float = 5e-4
     max_newton: int = 40
     max_passes: int = 80
+    linear: str = "direct"
 
     def __post_init__(self) -> None:
         require("static_tolerance", self.tolerance, low=0, high=0.01, low_open=True)
@@ -143,6 +146,7 @@ class StaticsControls:
         require("onset_tolerance", self.onset_tolerance, low=0, high=0.1, low_open=True)
         require("max_newton", self.max_newton, low=3, whole=True)
         require("max_passes", self.max_passes, low=3, whole=True)
+        choose("linear", self.linear, LINEAR)
 
 
 class EventControls(Protocol):

@@ -71,7 +71,11 @@ class Explicit:
         self.space, self.free = body.space, body.free
         self._free = np.ascontiguousarray(self.free.reshape(-1, self.space.dim))
         self._held: np.ndarray = np.logical_not(self._free.all(axis=1))
-        self._guided = np.flatnonzero(self._held)
+        self._exchange = self.space.exchange
+        counted = np.zeros(len(self._held), bool)
+        counted[self._exchange.counted] = True
+        self._counts = int(counted.sum())  # the first ones
+        self._guided, self._guided_counted = np.flatnonzero(self._held), counted[self._held]
         if self.loading.sliding is not None:
             self._held[self.loading.sliding.nodes] = True
         self._grip_velocity, self._knot = self.loading.velocity(0.0), np.inf
@@ -128,7 +132,7 @@ class Explicit:
         state.ledger.initial += state.ledger.kinetic + state.ledger.loads + self._pressed
 
     def _kinetic(self, state: State) -> float:
-        return float(self.mass @ half_square(state.v))
+        return self._exchange.dot(self.mass, half_square(state.v))
 
     # --- the step ---
     def run(self, state: State, t_end: float) -> Iterator[State]:
@@ -176,7 +180,8 @@ class Explicit:
             new_viscous = self.momentum.viscous_force(u, speeds, self._spare_viscous)
             force += new_viscous
         net = self.momentum.unheld(force)
-        trapezoid, held, kinetic, swing = kick((v, state.a, a), self._inverse, self.mass, (old, net), du, dt)
+        trapezoid, held, kinetic, swing = self._exchange.totals(
+            kick((v, state.a, a), self._inverse, self.mass, (old, net), du, dt, self._counts))
         ledger = state.ledger
         elastic, pressed = self.momentum.energy, self.momentum.pressed
         energy_fed_in = dt * dt / 8 * swing + (elastic - self._elastic) + (pressed - self._pressed) - trapezoid
@@ -188,7 +193,8 @@ class Explicit:
         energy = max(abs(initial), present, self.body.least_energy)
         if viscous is not None:
             drags = self.momentum.unheld(viscous), self.momentum.unheld(new_viscous)
-            work = viscous_work(drags, (-self.mass[:, None] * state.a, net), self._inverse, du, dt)
+            work = self._exchange.total(viscous_work(drags, (-self.mass[:, None] * state.a, net), self._inverse, du, dt,
+                                                     self._exchange.counted))
             energy_fed_in += work
         if dead is not None or pressures is not None:
             initial = max(abs(initial), present)
@@ -230,7 +236,8 @@ class Explicit:
         nodes = self._guided
         before, held = state.v[nodes], ~self._free[nodes]
         after = np.where(held, self.loading.motion(state.grip)[nodes], before)
-        gained = float(self.mass[nodes] @ (half_square(after) - half_square(before)))
+        gains = half_square(after) - half_square(before)
+        gained = self._exchange.total(float((self.mass[nodes] * self._guided_counted) @ gains))
         state.v[nodes] = after
         state.ledger.kinetic += gained
         state.ledger.work += gained
@@ -245,12 +252,14 @@ class Explicit:
             return
         state.gamma, state.sink, self._zones = now
         failed = delete_failed(self.space, state, self.body.deletion, self.density.failure_energy)
-        left = left_in(momentum, state.gamma, failed) if failed.size else 0.0
+        some = self._exchange.total(failed.size) > 0
+        left = left_in(momentum, state.gamma, failed) if some else 0.0
         stored, moving = self._thin(state)
         ledger.sink_stored += stored - left
         ledger.deletion += left
         ledger.sink_kinetic += moving
-        if failed.size and self.controls.debris == "remove" and delete_debris(state, self.density, self._held).size:
+        if some and self.controls.debris == "remove" and self._exchange.total(
+                delete_debris(state, self.density, self._held).size):
             self._W_max = momentum.backend.tile(state.W_max)
             gone = sum(self._thin(state))
             ledger.deletion += gone
@@ -266,14 +275,14 @@ class Explicit:
         if self._viscous is not None:
             ratio = np.divide(self.mass, mass, out=np.zeros_like(mass), where=mass > 0.0)
             self._viscous *= ratio[:, None]  # as the inertia, of kept accelerations; 0 without mass
-        half_v2 = half_square(state.v)
+        half_v2, dot = half_square(state.v), self._exchange.dot
         if dead is not None and loads is not None:
             ledger.work += dead.changed(loads, state.u)
             ledger.loads = dead.potential(state.u)
         self._elastic -= stored
         ledger.elastic = self._elastic
-        ledger.kinetic = float(self.mass @ half_v2)
-        return stored, float((mass - self.mass) @ half_v2)
+        ledger.kinetic = dot(self.mass, half_v2)
+        return stored, dot(mass - self.mass, half_v2)
 
     def sync(self, state: State) -> None:
         """Bring `state.W_max`, and the motion of nodes that follow the lips, up to date."""

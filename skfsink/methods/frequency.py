@@ -7,6 +7,7 @@ import scipy.linalg as la
 
 from ..errors import ConvergenceError, InstabilityError
 from ..fem.direct import Rows, add_symmetric_product
+from ..fem.exchange import Unknowns
 from ..fem.pattern import Pattern
 from ..fields.momentum import Momentum
 from ..system.jit import njit
@@ -25,10 +26,11 @@ def highest_frequency(momentum: Momentum, pattern: Pattern, free: np.ndarray, u:
     the last call. The estimate approaches from below, by about `tolerance`. Nodes without mass do not swing. Contact is
     not in it.
     """
-    if not pattern.size:  # every node is held: nothing swings
+    unknowns = momentum.space.exchange.over(free)
+    if not unknowns.size:  # every node is held: nothing swings
         return 0.0, np.zeros(0)
     by_dof = np.repeat(mass, momentum.space.dim)[free]
-    square, mode = _greatest(pattern, momentum.tangent(pattern, u), by_dof, start, tolerance)
+    square, mode = _greatest(unknowns, (pattern, momentum.tangent(pattern, u)), by_dof, start, tolerance)
     return float(np.sqrt(max(square, 0.0))), mode
 
 
@@ -39,10 +41,11 @@ def highest_damping(momentum: Momentum, pattern: Pattern, free: np.ndarray, u: n
     Elements count as compressed by `compression`; see :meth:`.Momentum.viscous_tangent`. A mode of the frequency omega
     and the damping ratio xi has c = 2 xi omega.
     """
-    if not pattern.size:
+    unknowns = momentum.space.exchange.over(free)
+    if not unknowns.size:
         return 0.0
     data = momentum.viscous_tangent(pattern, u, np.zeros_like(u), compression)
-    damping, _ = _greatest(pattern, data, np.repeat(mass, momentum.space.dim)[free], None, tolerance)
+    damping, _ = _greatest(unknowns, (pattern, data), np.repeat(mass, momentum.space.dim)[free], None, tolerance)
     return max(damping, 0.0)
 
 
@@ -55,27 +58,28 @@ def stable_step(omega: float, damping: float) -> float:
     return 4.0 / (damping + float(np.hypot(damping, 2.0 * omega)))
 
 
-def _greatest(pattern: Pattern, data: np.ndarray, mass: np.ndarray, start: np.ndarray | None,
+def _greatest(unknowns: Unknowns, matrix: tuple[Pattern, np.ndarray], mass: np.ndarray, start: np.ndarray | None,
               tolerance: float) -> tuple[float, np.ndarray]:
-    """Greatest eigenvalue of the matrix with this `data` over `mass` (size of the pattern), and its vector."""
+    """Greatest eigenvalue of a `matrix`, pattern and data, over `mass` (size of the pattern), and its vector."""
+    pattern, data = matrix
     indptr, indices = pattern.indptr.view(np.uint32), pattern.indices.view(np.uint32)
     root = np.sqrt(mass)
     _scale(indptr, indices, data, np.divide(1.0, root, out=np.zeros_like(root), where=root > 0.0))
     # The highest mode sits in one element, and the next one may sit in another, where the last result is zero: add
     # a vector that reaches everywhere, has no symmetry, and is the same every time.
-    everywhere = np.sin(1.0 + np.arange(pattern.size) * 2.399963) * np.sqrt(2.0 / pattern.size)
+    everywhere = np.sin(1.0 + unknowns.numbers * 2.399963) * np.sqrt(2.0 / unknowns.size)
     start = everywhere if start is None else everywhere + start
-    return _lanczos(indptr, indices, data, start / np.linalg.norm(start), tolerance)
+    start = start / np.sqrt(unknowns.dot(start, start))
+    return _lanczos(Rows(indptr, indices, data), unknowns, start, tolerance)
 
 
-def _lanczos(indptr: np.ndarray, indices: np.ndarray, data: np.ndarray, start: np.ndarray,
-             tolerance: float) -> tuple[float, np.ndarray]:
+def _lanczos(matrix: Rows, unknowns: Unknowns, start: np.ndarray, tolerance: float) -> tuple[float, np.ndarray]:
     """Greatest eigenvalue of a symmetric matrix, of which the upper triangle is given, and its vector.
 
     Its residual |A x - value x| is at most `tolerance` of it. The vectors lose their orthogonality, which gives an
     eigenvalue that has been found a second time, but none that is wrong.
     """
-    residual, matrix = np.inf, Rows(indptr, indices, data)
+    residual = np.inf
     for _ in range(RESTARTS):
         vectors: list[np.ndarray] = [start]
         diagonal: list[float] = []
@@ -83,7 +87,12 @@ def _lanczos(indptr: np.ndarray, indices: np.ndarray, data: np.ndarray, start: n
         previous, beta = np.zeros_like(start), 0.0
         while True:
             following = np.empty_like(start)
-            alpha, beta = _step(matrix, vectors[-1], previous, beta, following)
+            _product(matrix, vectors[-1], previous, beta, unknowns.counted, following)
+            unknowns.whole(following)
+            alpha = unknowns.total(_along(following, vectors[-1], unknowns.counted))
+            beta = float(np.sqrt(unknowns.total(_without(following, vectors[-1], alpha, unknowns.counted))))
+            if beta > 0.0:
+                following /= beta
             if not np.isfinite(alpha + beta):
                 raise InstabilityError("the tangent of the body is not finite: the explicit integration has blown up")
             diagonal.append(alpha)
@@ -96,7 +105,7 @@ def _lanczos(indptr: np.ndarray, indices: np.ndarray, data: np.ndarray, start: n
             vectors.append(following)
             beside.append(beta)
         start = modes[:, 0] @ np.array(vectors)
-        start /= np.linalg.norm(start)
+        start /= np.sqrt(unknowns.dot(start, start))
         if not residual > tolerance:
             return float(values[0]), start
     raise ConvergenceError(f"no highest frequency was found in {RESTARTS * STEPS} steps of Lanczos's method: its "
@@ -111,20 +120,29 @@ def _scale(indptr, indices, data, scale):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _step(A, v, previous, beta, following):  # type: ignore[no-untyped-def]
-    """following = (A v - alpha v - beta previous)/|..| for the upper triangle of A; returns alpha and that norm."""
+def _product(A, v, previous, beta, counted, following):  # type: ignore[no-untyped-def]
+    """following = A v - beta previous for the upper triangle of A, of a part of a body its share."""
     for i in range(v.size):
-        following[i] = -beta * previous[i]
+        following[i] = -beta * previous[i] if counted[i] else 0.0
     add_symmetric_product(A.indptr, A.indices, A.data, v, following)
+
+
+@njit(cache=True)
+def _along(following, v, counted):  # type: ignore[no-untyped-def]
+    """alpha = following . v over what counts."""
     alpha = 0.0
     for i in range(v.size):
-        alpha += following[i] * v[i]
+        if counted[i]:
+            alpha += following[i] * v[i]
+    return alpha
+
+
+@njit(cache=True)
+def _without(following, v, alpha, counted):  # type: ignore[no-untyped-def]
+    """following -= alpha v; returns its square over what counts."""
     square = 0.0
     for i in range(v.size):
         following[i] -= alpha * v[i]
-        square += following[i] * following[i]
-    norm = np.sqrt(square)
-    if norm > 0.0:
-        for i in range(v.size):
-            following[i] /= norm
-    return alpha, norm
+        if counted[i]:
+            square += following[i] * following[i]
+    return square

@@ -14,7 +14,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from ..errors import ConvergenceError
-from ..fem.direct import Factorization
+from ..fem.linear import solver
 from ..fem.pattern import Pattern
 from ..fields.momentum import Momentum
 
@@ -35,6 +35,7 @@ class Newton:
     tolerance: residual force at which equilibrium is reached, relative to the forces inside and the loads.
     most: Newton steps after which an equilibrium is given up, unless a call says more.
     threads: of the factorisations.
+    linear: what solves for steps, a name in :data:`.LINEAR`.
 
     Attributes
     ----------
@@ -45,17 +46,16 @@ class Newton:
     KEEP = 0.2      # factors are used as they are while each step with them lowers the residual to this fraction
     FAR = 0.5       # far from equilibrium: a step leaves more than this of the residual, or had to be shortened
     INEXACT = 0.02  # relative residual of a step by conjugate gradients
-    MOST = (5, 12)  # their iterations, in two and in three dimensions
-    WORTH = (10, 24)  # iterations that take as long as a factorisation, on a body of 50,000 elements
     LEAST_J = 0.05  # of a Gauss point that still carries force; below, a trial is refused
     SHORTEST = 1e-6  # step length at which a direction is given up
     RIM = 60         # iterations of GMRES, for the rim of a pressurised surface
 
-    def __init__(self, momentum: Momentum, free: np.ndarray, tolerance: float, most: int, threads: int = 1) -> None:
+    def __init__(self, momentum: Momentum, free: np.ndarray, tolerance: float, most: int, threads: int = 1, *,
+                 linear: str = "direct") -> None:
         self.momentum, self.free, self.tolerance, self.most = momentum, free, tolerance, most
         self.space = momentum.space
         self.pattern = Pattern(self.space, self.space.dim, free, upper=True)
-        self.solver = Factorization(self.pattern, threads=threads)
+        self.solver = solver(linear, self.space, free, self.pattern, threads)
         self.steps = self.iterations = 0
         self._volume = self.space.lump(np.ones_like(self.space.w))
         # a body that has come apart bears no force; this says what counts as none, in the softest material too
@@ -94,7 +94,7 @@ class Newton:
             if length < 1.0 or error > self.FAR * last:
                 self._kept = None
             last = error
-            modified = self._kept is not None and not self._slow
+            modified = self.solver.exact and self._kept is not None and not self._slow
             step, fresh = np.zeros(u.shape), False
             while True:
                 if modified:
@@ -141,8 +141,9 @@ class Newton:
         """A step that lowers the residual force `r` at `u`, and whether the factors behind it are those of `u`."""
         data = self.momentum.tangent(self.pattern, u)
         added, skew = self.momentum.added_stiffness(u, self.free), self.momentum.skew_stiffness(u, self.free)
-        if self._kept is not None and added is None and skew is None and self._spent < self.WORTH[self.space.dim - 2]:
-            most = self.MOST[self.space.dim - 2]
+        plane = self.space.dim - 2
+        most, worth = self.solver.MOST[plane], self.solver.WORTH[plane]
+        if self._kept is not None and added is None and skew is None and self._spent < worth:
             d, iterations, met = self.solver.conjugate(data, -r, tolerance, most)
             self.iterations += iterations
             self._spent += iterations + 2  # an assembly takes as long as two
@@ -151,11 +152,26 @@ class Newton:
             if met or iterations > most // 2:
                 return d, False
         self._factorise(u, data)
+        if not self.solver.exact and added is None and skew is None:
+            return self._iterate(u, data, r, tolerance), True
         if skew is None or not self.solver.definite:
             return self._solve(r, added), True
         d, iterations = self._krylov(data, skew, added, r)
         self.iterations += iterations
         return d, True
+
+    def _iterate(self, u: np.ndarray, data: np.ndarray, r: np.ndarray, tolerance: float) -> np.ndarray:
+        """Solution of K d = -r by conjugate gradients; of a positive definite matrix like K where that curves down."""
+        most = self.solver.MOST[self.space.dim - 2]
+        d, iterations, _ = self.solver.conjugate(data, -r, tolerance, most)
+        self.iterations += iterations
+        if not d.any() and r.any():
+            data = self.momentum.tangent(self.pattern, u, convex=True)
+            self.solver.factorize(data)
+            d, iterations, _ = self.solver.conjugate(data, -r, tolerance, most)
+            self.iterations += iterations
+            self._kept = None
+        return d
 
     def _krylov(self, data: np.ndarray, skew: csr_array, added: np.ndarray | None,
                 r: np.ndarray) -> tuple[np.ndarray, int]:

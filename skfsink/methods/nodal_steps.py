@@ -32,15 +32,19 @@ def move(now, free, grip_velocity, dt, new):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def kick(motion, inverse, mass, forces, du, dt):  # type: ignore[no-untyped-def]
+def kick(motion, inverse, mass, forces, du, dt, counted):  # type: ignore[no-untyped-def]
     """Second half of the step: v at half of it goes to its end, and a is found there, from the forces before and after.
 
-    Returns trapezoidal work (all, held), kinetic energy, and the change of f.m^-1 f (free).
+    Returns trapezoidal work (all, held), kinetic energy, and the change of f.m^-1 f (free), of the first `counted`
+    nodes.
     """
     v, a, a_new = motion
     old, force = forces
     work, held, kinetic, swing = 0.0, 0.0, 0.0, 0.0
+    rest = work, held, kinetic, swing
     for n in range(v.shape[0]):
+        if n == counted:
+            rest = work, held, kinetic, swing
         square = 0.0
         for i in range(v.shape[1]):
             f, one_by_m = force[n, i], inverse[n, i]
@@ -55,12 +59,17 @@ def kick(motion, inverse, mass, forces, du, dt):  # type: ignore[no-untyped-def]
                 held += 0.5 * (old[n, i] + f) * du[n, i]
             square += v[n, i] * v[n, i]
         kinetic += 0.5 * mass[n] * square
+    if counted < v.shape[0]:
+        work, held, kinetic, swing = rest
     return work + held, held, kinetic, swing
 
 
 def viscous_work(viscous: tuple[np.ndarray, np.ndarray], forces: tuple[np.ndarray, np.ndarray], inverse: np.ndarray,
-                 du: np.ndarray, dt: float) -> float:
-    """What of the identity of a step is not of internal forces alone; viscous and whole forces before and after."""
-    (old, new), (whole_old, whole_new) = viscous, forces
+                 du: np.ndarray, dt: float, counted: slice = slice(None)) -> float:
+    """What of the identity of a step is not of internal forces alone, at the nodes that are `counted`.
+
+    `viscous` and whole `forces` are those before and after.
+    """
+    old, new, whole_old, whole_new, inverse, du = (x[counted] for x in (*viscous, *forces, inverse, du))
     swing = new * (2 * whole_new - new) - old * (2 * whole_old - old)
     return 0.5 * float(np.vdot(old + new, du)) - dt * dt / 8 * float(np.vdot(inverse, swing))

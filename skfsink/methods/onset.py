@@ -70,7 +70,8 @@ class StaticLoading:
         self.controls = controls or StaticsControls()
         self.space, self.free = body.space, body.free
         self.clock = LoadTime(self.loading, body.size, self.momentum.material.shear_modulus, self.controls.increment)
-        self.newton = Newton(self.momentum, self.free, self.controls.tolerance, self.controls.max_newton, body.threads)
+        self.newton = Newton(self.momentum, self.free, self.controls.tolerance, self.controls.max_newton, body.threads,
+                             linear=self.controls.linear)
         self.increment = 0.0      #: current load increment, as load time [s]; 0 before the first
         self.refused = ""         #: why the last increment was given up: "no equilibrium", "runs away", "passes",
         #: "softens" (the increment is too long to follow the load over its peak), "open" (too long for the ledger) or

@@ -32,12 +32,13 @@ def raised_mass(momentum: Momentum, share: float) -> tuple[np.ndarray | None, fl
     space, square = momentum.space, np.empty(momentum.space.n_elements)
     for material, elements, _ in momentum.parts:
         square[slice(None) if elements is None else elements] = material.dilatational_wave_speed**2
-    b = space.mean_slopes()
+    b, exchange = space.mean_slopes(), space.exchange
     square *= b.shape[1] * np.einsum("eai,eai->e", b, b)
-    fastest = np.argsort(-square, kind="stable")
-    count = np.count_nonzero(np.cumsum(space.V[fastest]) <= share * space.V.sum())
-    ratio = square / square[fastest[count]]
+    squares, V = exchange.all(square), exchange.all(space.V)
+    fastest = np.argsort(-squares, kind="stable")
+    count = np.count_nonzero(np.cumsum(V[fastest]) <= share * V.sum())
+    ratio = square / squares[fastest[count]]
     factors = np.where(ratio > 1 + 1e-9, ratio, 1.0)[:, None]
     mass = momentum.rho0 * space.V[:, None]
-    added = float((mass * (factors - 1)).sum() / mass.sum())
+    added = exchange.total(float((mass * (factors - 1)).sum())) / exchange.total(float(mass.sum()))
     return (factors, added) if added > 0.0 else (None, 0.0)

@@ -158,11 +158,14 @@ class StepLength:
                 f"the explicit integration blew up at t = {state.time:.4g} s (step {state.step}): lower courant, now "
                 f"{self.controls.courant:g}, or reject such steps by an energy_tolerance of "
                 f"{ExplicitControls.energy_tolerance:g}")
-        speed = np.abs(np.nan_to_num(v, nan=np.inf)).max(axis=1)
+        space, speed = self.momentum.space, np.abs(np.nan_to_num(v, nan=np.inf)).max(axis=1)
+        fastest = int(np.argmax(speed))
+        all_parts = space.exchange.all(np.array([[speed[fastest], *space.X[fastest]]]))
+        place = all_parts[int(np.argmax(all_parts[:, 0])), 1:]
         raise InstabilityError(
             f"no explicit step down to {self.dt:.2g} s keeps the energy of the body to "
             f"{self.controls.energy_tolerance:g} of it, at t = {state.time:.4g} s (step {state.step}), near "
-            f"{place_text(self.momentum.space.X[int(np.argmax(speed))])} mm of the undeformed body: refine the mesh "
+            f"{place_text(place)} mm of the undeformed body: refine the mesh "
             f"there, raise energy_tolerance, or take --integrator hht")
 
     @property

@@ -16,6 +16,8 @@ from typing import Any
 from ..errors import CheckpointError, Interrupted, ParameterError, first_line
 from ..fields.state import State
 from ..meshing.kept_mesh import MESH, keep_mesh
+from ..methods.ranks.integrator import ranks_text
+from ..methods.ranks.integrator import refuse as refuse_on_ranks
 from ..pictures.of_a_run import draw_comparison, draw_run
 from ..results.history import History
 from ..results.probes import PROBES
@@ -175,6 +177,8 @@ def _check(scene: Scene, job: _Job) -> None:
     if both:
         _copied(job.observers)
     check_memory(scene, job.display)
+    c = scene.controls
+    refuse_on_ranks(c.analysis, c.integrator, scene.loading(), c, scene.space.n_elements)
     if not job.resumes:
         refuse(scene)
 
@@ -283,6 +287,8 @@ def _announce(simulation: Simulation, job: _Job) -> None:
     space = scene.sample.space
     for text in scene.sample.notes:
         job.display.say(f"note: {text}")
+    if ranks := ranks_text(scene.controls.analysis, scene.controls.integrator):
+        job.display.say(ranks)
     job.display.say(f"{scene.title}, mesh {scene.sample.name}: {space.n_elements} elements, "
                     f"{int(simulation.free.sum())} + {space.n_nodes} unknowns; {scene.controls.analysis} analysis in "
                     f"{job.folder}")

@@ -1,9 +1,8 @@
-"""Memory of a run: what it will need, estimated from its mesh before anything is computed, and what it has needed."""
+"""Memory that a run will need, estimated from its mesh before anything is computed."""
 
 from __future__ import annotations
 
 import os
-import sys
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -16,12 +15,7 @@ from ..fem.space import Space
 from ..scene.scene import Scene
 from .display import Display
 
-try:
-    import resource
-except ImportError:  # Windows, and systems without processes
-    resource = None  # type: ignore[assignment]
-
-__all__ = ["LIMIT", "available", "check_memory", "estimate", "factor_entries", "peak_rss_mb"]
+__all__ = ["LIMIT", "available", "check_memory", "estimate", "factor_entries"]
 
 LIMIT = "SKFSINK_MEMORY_GB"  #: environment variable: memory that a run may use [GB], instead of what is found
 LEAF = 60           # elements that dissection does not divide further
@@ -32,8 +26,10 @@ PER_ELEMENT = {2: 19e-6, 3: 10e-6}   # GB, fields, matrices, pictures
 FACTORS = 1.25                       # of the matrix of equilibrium: more than one where it is not positive definite too
 
 
-def estimate(space: Space) -> float:
-    """Greatest memory [GB] that a run on this mesh takes, of the whole process."""
+def estimate(space: Space, statics: bool = True) -> float:
+    """Greatest memory [GB] that a run on this mesh takes, of the whole process; without `statics` it has no factors."""
+    if not statics:
+        return float(PROGRAM + PER_ELEMENT[space.dim] * space.n_elements)
     entries = factor_entries(space) if space.dim == 3 else 4.5 * space.n_nodes * np.log2(space.n_nodes)
     return float(PROGRAM + PER_ELEMENT[space.dim] * space.n_elements + FACTORS * 8e-9 * space.dim**2 * entries)
 
@@ -53,15 +49,6 @@ def available() -> float:
     return float(min(free) + psutil.Process().memory_info().rss) / 1e9
 
 
-def peak_rss_mb() -> float:
-    """Greatest memory this process has used [MB]; what it uses now, where the system does not keep that."""
-    if resource is None:
-        memory = psutil.Process().memory_info()
-        return float(getattr(memory, "peak_wset", memory.rss)) / 1e6
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return peak / 1e6 if sys.platform == "darwin" else peak / 1e3
-
-
 def check_memory(scene: Scene, display: Display) -> None:
     """Say how much memory a large run will need.
 
@@ -71,7 +58,7 @@ def check_memory(scene: Scene, display: Display) -> None:
         It is more than there is.
     """
     space, there = scene.sample.space, available()
-    needed = estimate(space)
+    needed = estimate(space, scene.event_at > 0.0 or scene.controls.integrator != "explicit")
     if needed > there:
         raise ParameterError(f"the run will need about {needed:.1f} GB of memory for {space.n_elements} elements, and "
                              f"there are {there:.1f} GB; take a coarser mesh or a larger machine, or set {LIMIT} to "

@@ -15,7 +15,8 @@ from ..errors import CheckpointError, ConvergenceError, Interrupted
 from ..fem.direct import one_thread_of_openblas
 from ..fields.body import Body
 from ..fields.state import State
-from ..methods.integrators import INTEGRATORS, Integrator
+from ..methods.integrators import Integrator
+from ..methods.ranks.integrator import InParts, integrator_of
 from ..methods.rest import LoadingFromRest
 from ..methods.statics import Statics
 from ..scene.scene import Scene
@@ -212,7 +213,7 @@ class Simulation:
             self._from_rest = LoadingFromRest(self.body, c.hht)
             self.integrator = self._from_rest.integrator
         else:
-            self.integrator = self.view.integrator = INTEGRATORS[c.integrator].of(self.body, c)
+            self.integrator = self.view.integrator = integrator_of(c.integrator, self.body, c)
         return self.integrator
 
     def _integrate(self) -> None:
@@ -224,7 +225,7 @@ class Simulation:
             view.end, cracked = self.PATIENCE * event_time, float(tracker.cracked_at.min())
         for _ in integrator.run(state, view.end):
             self.costs.steps += 1
-            self.observers.step(view.at(state, integrator.reaction, "step", dt=integrator.dt))
+            self.observers.step(view.at(state, lambda: integrator.reaction, "step", dt=integrator.dt))
             if tracker.separated and state.time >= self.crack.separated_at + self.scene.controls.aftermath:
                 break
             if cracked == np.inf and view.tips.branches:
@@ -256,14 +257,17 @@ class Simulation:
     # --- costs and checkpoints ---
     def cost(self) -> dict[str, Any]:
         """Wall times and counts since the run began, over all its sessions."""
-        stepping, rejected = 0, 0
+        stepping, rejected, others, ranks = 0, 0, 0, {}
+        if isinstance(self.integrator, InParts):
+            others, ranks = self.integrator.solves, {"ranks": self.integrator.cost()}
         if self.integrator is not None:
             stepping = self.integrator.factorisations
             rejected = self.integrator.rejected if self.state.phase != "loading" else 0
         factorisations = (self.costs.factorisations + self.statics.factorisations + self.density.factorisations
                           + stepping)
         return {"wall": dict(self.costs.wall), "steps": self.costs.steps, "rejected_steps": rejected,
-                "gamma_solves": self.costs.gamma_solves + self.density.solves, "factorisations": factorisations}
+                "gamma_solves": self.costs.gamma_solves + self.density.solves + others,
+                "factorisations": factorisations, **ranks}
 
     def _save(self) -> None:
         self.costs.lap(self.state.phase)

@@ -14,8 +14,8 @@ from ..results.frame import SPENT
 from ..results.history import history_units, load_name
 from ..results.summary import versions
 from ..scene.scene import Scene
+from ..system.peak import peak_rss_mb
 from .material_point import beside_theory
-from .memory import peak_rss_mb
 from .observers.fragments import fragment_summary
 from .observers.places import greatest_ratio
 from .quantities import measured
@@ -81,7 +81,8 @@ def summarize(scene: Scene, simulation: Simulation) -> dict[str, Any]:
         "cost": {"wall_s": {k: round(v, 3) for k, v in cost["wall"].items()}, "steps": cost["steps"],
                  "rejected_steps": cost["rejected_steps"], "gamma_solves": cost["gamma_solves"],
                  "factorisations": cost["factorisations"],
-                 "peak_rss_mb": round(peak_rss_mb(), 1)},
+                 "peak_rss_mb": round(peak_rss_mb(), 1),
+                 **({"ranks": cost["ranks"]} if "ranks" in cost else {})},
         "versions": versions(), "assumed": list(scene.assumed), "moments": simulation.frames.moments,
         "series": "loading" if simulation.unfailed else "run"}
 

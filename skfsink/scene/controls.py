@@ -10,7 +10,7 @@ import numba
 from ..errors import ParameterError, choose, require
 from ..fem.backends import backend
 from ..fem.elements import ELEMENTS
-from ..fields.density import GRADIENTS
+from ..fields.density import GRADIENTS, SOLVERS
 from ..fields.sinks import SINKS
 from ..methods.controls import ExplicitControls, HHTControls, StaticsControls
 from ..methods.integrators import INTEGRATORS
@@ -45,6 +45,7 @@ class Controls:
     threads: that share factorisations and loops over elements, >= 0; 0 takes one for a plane body and else
         OMP_NUM_THREADS or the machine's cores, at most 4. Runs with the same number agree to the last bit.
     start: of a dynamic analysis, "onset" (statics up to there) or "rest" (see :mod:`.rest`).
+    density_solver: "multigrid" or "jacobi"; see :data:`.SOLVERS`. Several ranks take "jacobi" in the event.
     active_zone: explicit steps solve for gamma only where it changes (see :mod:`.active_zone`).
     contact: the lips of cracks bear on each other (see :mod:`.contact`), in events and quasi-static passes.
     kernels: "compiled", or "forms" (scikit-fem forms, for small meshes), or another name in :data:`.BACKENDS`.
@@ -67,6 +68,7 @@ class Controls:
     checkpoint_every: float = 20.0
     threads: int = 0
     start: str = "onset"
+    density_solver: str = "multigrid"
     active_zone: bool = True
     contact: bool = False
     kernels: str = "compiled"
@@ -91,6 +93,7 @@ class Controls:
                                  f"{self.analysis}, integrator {self.integrator}: take debris keep")
         choose("sink", self.sink, SINKS)
         choose("gradient", self.gradient, GRADIENTS)
+        choose("density_solver", self.density_solver, SOLVERS)
         choose("element", self.element, ELEMENTS)
         backend(self.kernels)
         require("overshoot", self.overshoot, low=0, high=0.1, low_open=True)

@@ -114,6 +114,8 @@ class Options:
     gradient
         Matrix of the gradient term of γ: "monotone" (keeps 0 < γ <= 1 on every mesh) or "gauss" (the paper's; that of
         the consistent sink in any case).
+    density_solver
+        Conjugate gradients for γ with "multigrid", or with "jacobi", the diagonal alone (what several ranks take).
     deletion
         γ at which an element fails, in (0, 0.01].
     force_floor
@@ -128,6 +130,9 @@ class Options:
         Of the dynamic event: "explicit" or "hht".
     front
         Quasi-static: a pass fails the points with at least this share of the greatest stored energy, in [0, 1].
+    linear
+        Statics: "direct" (factors), or conjugate gradients with the hierarchies "multigrid" or "petsc-gamg", for bodies
+        whose factors are too large.
     element
         "jbar" (element-constant J̄), "plain" (standard Q1, locks), "planestress" (thin sheet with free faces, in 2D) or
         "axisymmetric" (body of revolution about the y axis, J̄; a 2D mesh at x >= 0; figures are of the whole body).
@@ -213,6 +218,7 @@ class Options:
     length_scale: Annotated[float, SINK, Unit("mm")] = SinkLaw.length_scale
     sink: Annotated[str, SINK] = Controls.sink
     gradient: Annotated[str, SINK] = Controls.gradient
+    density_solver: Annotated[str, SINK] = Controls.density_solver
     deletion: Annotated[float, SINK] = Controls.deletion
     force_floor: Annotated[float, SINK] = Controls.force_floor
     speed: Annotated[float, LOADING, Unit("mm/s")] = 1e-3
@@ -220,6 +226,7 @@ class Options:
     analysis: Annotated[str, ANALYSIS] = Controls.analysis
     integrator: Annotated[str, ANALYSIS] = Controls.integrator
     front: Annotated[float, ANALYSIS] = StaticsControls.front
+    linear: Annotated[str, ANALYSIS] = StaticsControls.linear
     element: Annotated[str, ANALYSIS] = Controls.element
     kernels: Annotated[str, ANALYSIS] = Controls.kernels
     contact: Annotated[bool, CONTACT] = Controls.contact
@@ -317,7 +324,7 @@ class Options:
                                                 raised_mass=self.raised_mass),
             hht=HHTControls(self.hht_alpha, self.hht_dt, coupling=self.coupling, mass=self.mass,
                             mass_floor=self.mass_floor),
-            statics=StaticsControls(front=self.front))
+            statics=StaticsControls(front=self.front, linear=self.linear))
 
     def parameters(self) -> dict[str, Any]:
         """The options that decide results, by name; the energy limiter is that of the law where it was 0.

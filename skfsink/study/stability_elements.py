@@ -210,7 +210,7 @@ def consistent(sink: str, per_length: int, epsilon: float, seed: int) -> dict[st
     solver = DensitySolver(space, law, sink)
     data = solver._assemble(1.0 / (law.history(W) + law.epsilon))
     one = np.ones(space.n_nodes)
-    result = solver._amg.solve(solver.pattern.matrix(data), data[solver.pattern.diagonal], solver.load, one)
+    result = solver._iterative.solve(solver.pattern.matrix(data), data[solver.pattern.diagonal], solver.load, one)
     A = solver.pattern.matrix(data)
     scale = diags_array(1 / np.sqrt(A.diagonal()))
     scaled = csc_array(scale @ A @ scale)
@@ -223,7 +223,7 @@ def consistent(sink: str, per_length: int, epsilon: float, seed: int) -> dict[st
 
     cg(scaled, scale @ solver.load, rtol=1e-8, maxiter=5000, callback=another)
     return {"sink": sink, "l_over_h": per_length, "epsilon": epsilon, "least": float(gamma.min()),
-            "greatest": float(gamma.max()), "jacobi": count, "amg": solver._amg.iterations,
+            "greatest": float(gamma.max()), "jacobi": count, "amg": solver._iterative.iterations,
             "amg_converged": result is not None}
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
@@ -27,14 +27,13 @@ class View:
     Observers change nothing in it, but for :class:`.Crack`, which looks first and sets `tips`, `moment` and `waiting`
     for all others; an observer in its place has to set them too.
 
-    Memory: all of it: the run moves it on with `at`, and `load`, `displacement`, `stress`, `stress_is_known`,
-    `step_share` and `crossed_multiple_of` are of the moment it is at.
+    Memory: all of it: the run moves it on with `at`, and `load`, `displacement`, `reaction`, `stress`,
+    `stress_is_known`, `step_share` and `crossed_multiple_of` are of the moment it is at.
 
     Attributes
     ----------
     scene, folder, body: what is computed, where its files go, its balances.
     state: the fields now.
-    reaction: internal force less the dead loads at its displacement, (n, dim) [N; N/mm in 2D].
     dt: the last time step [s], 0 in statics.
     before: time of the state at the step before [s], or number of the pass.
     way: in loading, how far it has come, in its largest increments.
@@ -55,7 +54,6 @@ class View:
     tips: Tips
     state: State
     integrator: Integrator | None = None
-    reaction: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     dt: float = 0.0
     before: float = 0.0
     way: float = 0.0
@@ -73,6 +71,14 @@ class View:
     def __post_init__(self) -> None:
         self.now = self.state.time
         self._stress: np.ndarray | None = None
+        self._reaction: np.ndarray | Callable[[], np.ndarray] = np.zeros((0, 0))
+
+    @property
+    def reaction(self) -> np.ndarray:
+        """Internal force less the dead loads at the displacement, (n, dim) [N; N/mm in 2D]."""
+        if not isinstance(self._reaction, np.ndarray):
+            self._reaction = self._reaction()
+        return self._reaction
 
     @cached_property
     def gauge(self) -> Gauge:
@@ -116,12 +122,12 @@ class View:
         """The step over its stability limit at this state; infinite where an integrator has none."""
         return np.inf if self.integrator is None else self.integrator.step_share(self.state)
 
-    def at(self, state: State, reaction: np.ndarray, occasion: str = "loading", *, dt: float = 0.0,
-           way: float = 0.0) -> View:
-        """Move on to a state; see the attributes."""
+    def at(self, state: State, reaction: np.ndarray | Callable[[], np.ndarray], occasion: str = "loading", *,
+           dt: float = 0.0, way: float = 0.0) -> View:
+        """Move on to a state; see the attributes. The `reaction` may be what gives it when it is asked for."""
         self.before = state.time if occasion == "begin" else self.now
         self.now = state.time
-        self.state, self.reaction, self.occasion, self.dt, self.way = state, reaction, occasion, dt, way
+        self.state, self._reaction, self.occasion, self.dt, self.way = state, reaction, occasion, dt, way
         self.moment, self._stress = "", None
         return self
 

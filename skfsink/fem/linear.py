@@ -1,0 +1,30 @@
+"""What solves for the displacements of statics, by name: adding a solver is its class, and a line in `LINEAR`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from .direct import Factorization
+from .multigrid import Gamg, Multigrid
+from .pattern import Pattern
+from .space import Space
+
+__all__ = ["LINEAR", "Solver", "solver"]
+
+Solver = Factorization | Multigrid
+
+
+def _direct(space: Space, free: np.ndarray, pattern: Pattern, threads: int) -> Solver:
+    return Factorization(pattern, threads=threads)
+
+
+#: "direct" takes PARDISO, or SuperLU where that is not installed
+LINEAR: dict[str, Callable[[Space, np.ndarray, Pattern, int], Solver]] = {
+    "direct": _direct, "multigrid": Multigrid, "petsc-gamg": Gamg}
+
+
+def solver(name: str, space: Space, free: np.ndarray, pattern: Pattern, threads: int) -> Solver:
+    """A solver over the unknowns that are `free` (n*dim,), of matrices on the `pattern` of these."""
+    return LINEAR[name](space, free, pattern, threads)

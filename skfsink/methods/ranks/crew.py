@@ -1,0 +1,253 @@
+"""Ranks that have a part of the body each, and do what the first one asks.
+
+The first rank runs the program: it loads the body, looks at the event, writes files. The others wait for what it
+asks: to take up their part, to step, to give what they have of a field. All of them step together.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import signal
+import sys
+import traceback
+from collections.abc import Callable
+from contextlib import suppress
+from typing import TYPE_CHECKING, NoReturn
+
+import numpy as np
+
+from ...errors import SkfsinkError
+from ...fields.state import State
+from ...system.peak import peak_rss_mb
+from ..explicit import Explicit
+from .mpi import MPIExchange, wait
+from .part import PartOfBody, state_of
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
+__all__ = ["Crew", "Member", "lead"]
+
+IDLE = 1e-3    # s without a task, after which a rank looks for one less often
+UNEXPECTED = 1  # exit status of a program that ends by a mistake of its own
+TASKS = ("end", "take", "begin", "restore", "step", "gather", "deletions", "memory", "share", "sync", "peaks")
+
+
+def lead(comm: MPI.Intracomm, program: Callable[[], object]) -> NoReturn:
+    """Run the `program` on the first rank, and let the others serve it; all end with it."""
+    crew = Crew(comm)
+    if comm.rank:
+        crew.serve()
+    try:
+        program()
+    except SystemExit as end:
+        if end.code == UNEXPECTED:  # the others may be in the middle of a step
+            comm.Abort(UNEXPECTED)
+        crew.end()
+        raise
+    except BaseException:
+        traceback.print_exc()
+        comm.Abort(UNEXPECTED)
+    crew.end()
+    raise SystemExit(0)
+
+
+class Member:
+    """One rank with its part of the body.
+
+    Memory: its part, the state of this and its integrator: after `take`, and `begin` or `restore`, `step`, `sync`,
+    `share`, `field`, `new_deletions` and `memory` go on with them.
+    """
+
+    def __init__(self, comm: MPI.Intracomm) -> None:
+        self.comm = comm
+        self.part: PartOfBody | None = None
+
+    def take(self, part: PartOfBody) -> None:
+        """Take up a part of the body."""
+        self.part, self.body = part, part.body(self.comm)
+        self.explicit = Explicit(self.body, part.controls)
+        assert isinstance(self.body.space.exchange, MPIExchange)
+        self.exchange = self.body.space.exchange
+        self.logged = 0
+
+    def begin(self, state: State) -> None:
+        """Set the part in motion."""
+        self.state = state
+        self.explicit.begin(state)
+
+    def restore(self, state: State, memory: dict[str, np.ndarray]) -> None:
+        """Go on where a checkpoint was taken."""
+        self.state = state
+        self.explicit.restore(state, memory)
+
+    def step(self) -> None:
+        """One step, as all others."""
+        self.explicit.step(self.state)
+
+    def sync(self) -> None:
+        """Bring the history of the part up to date."""
+        self.explicit.sync(self.state)
+
+    def share(self) -> float:
+        """The step over its stability limit, in the whole body."""
+        return self.explicit.step_share(self.state)
+
+    def field(self, name: str) -> np.ndarray | None:
+        """What counts here of a field: of the nodes, or of the elements."""
+        assert self.part is not None
+        if name == "reaction":
+            return self.explicit.reaction[:self.part.numbers.counted]
+        value: np.ndarray | None = getattr(self.state, name)
+        return value if value is None or name in ("W_max", "deleted", "sink") else value[:self.part.numbers.counted]
+
+    def new_deletions(self) -> list[tuple[float, int]]:
+        """What has failed here since it was last asked for, by numbers in the whole body."""
+        assert self.part is not None
+        new, self.logged = self.state.deletions[self.logged:], len(self.state.deletions)
+        return [(t, int(self.part.numbers.elements[e])) for t, e in new]
+
+    def memory(self) -> dict[str, np.ndarray]:
+        """What the integrator remembers; vectors over free unknowns are those that count here."""
+        unknowns, memory = self.body.space.exchange.over(self.body.free), self.explicit.memory()
+        return {**memory, "mode": memory["mode"][unknowns.counted], "numbers": unknowns.numbers[unknowns.counted]}
+
+
+class Crew:
+    """All ranks, as the first of them leads them, or another one serves.
+
+    Memory: the part of this rank, and the `numbers` of all: after `take`, `begin`, `restore` and `gather` are of them.
+
+    Parameters
+    ----------
+    comm: the ranks.
+    """
+
+    def __init__(self, comm: MPI.Intracomm) -> None:
+        self.comm, self.member = comm, Member(comm)
+
+    @property
+    def size(self) -> int:
+        """Number of ranks."""
+        return int(self.comm.size)
+
+    # --- the first rank ---
+    def _ask(self, task: str, detail: int = 0) -> None:
+        wait(self.comm.Ibcast(np.array([TASKS.index(task), detail], np.int64)))
+
+    def take(self, parts: list[PartOfBody]) -> None:
+        """Give every rank its part."""
+        self._ask("take")
+        self.numbers = [part.numbers for part in parts]
+        self.member.take(self.comm.scatter(parts))
+
+    def begin(self, state: State) -> None:
+        """Set the body in motion from a state of the whole."""
+        self._ask("begin")
+        self.member.begin(self.comm.scatter([state_of(state, part) for part in self.numbers]))
+
+    def restore(self, state: State, memories: list[dict[str, np.ndarray]]) -> None:
+        """Go on from a state of the whole, and what the integrator of each part remembers."""
+        self._ask("restore")
+        states = [state_of(state, part) for part in self.numbers]
+        self.member.restore(*self.comm.scatter(list(zip(states, memories))))
+
+    def step(self) -> None:
+        """One step of all."""
+        self._ask("step")
+        self.member.step()
+
+    def sync(self) -> None:
+        """Bring histories up to date."""
+        self._ask("sync")
+        self.member.sync()
+
+    def share(self) -> float:
+        """The step over its stability limit."""
+        self._ask("share")
+        return self.member.share()
+
+    def gather(self, name: str) -> np.ndarray | None:
+        """A field of the whole body: `FIELDS` has their names."""
+        self._ask("gather", FIELDS.index(name))
+        parts = self.comm.gather(self.member.field(name))
+        assert parts is not None
+        if parts[0] is None:
+            return None
+        elemental = name in ("W_max", "deleted", "sink")
+        places = [n.elements if elemental else n.nodes[:n.counted] for n in self.numbers]
+        whole: np.ndarray = np.empty((sum(place.size for place in places), *parts[0].shape[1:]), parts[0].dtype)
+        for place, values in zip(places, parts):
+            whole[place] = values
+        return whole
+
+    def new_deletions(self) -> list[tuple[float, int]]:
+        """What has failed since it was last asked for."""
+        self._ask("deletions")
+        found = self.comm.gather(self.member.new_deletions())
+        assert found is not None
+        return sorted(entry for log in found for entry in log)
+
+    def memories(self) -> list[dict[str, np.ndarray]]:
+        """What the integrator of each part remembers."""
+        self._ask("memory")
+        found = self.comm.gather(self.member.memory())
+        assert found is not None
+        return found
+
+    def peaks(self) -> list[float]:
+        """Greatest memory that each rank has used [MB]."""
+        self._ask("peaks")
+        found = self.comm.gather(peak_rss_mb())
+        assert found is not None
+        return found
+
+    def end(self) -> None:
+        """Let all others go."""
+        self._ask("end")
+
+    # --- the others ---
+    def serve(self) -> NoReturn:
+        """Do what the first rank asks, until it lets this one go; what goes wrong here alone ends all ranks."""
+        for interrupt in (signal.SIGINT, signal.SIGTERM):  # the first rank decides what becomes of them
+            signal.signal(interrupt, signal.SIG_IGN)
+        logging.disable()  # what there is to say the first rank says
+        try:
+            while (task := self._next_task())[0] != "end":
+                with suppress(SkfsinkError):  # it is that of all ranks, and the first one tells it
+                    self._do(*task)
+        except BaseException as error:
+            if "SKFSINK_DEBUG" in os.environ:
+                traceback.print_exc()
+            print(f"skfsink: rank {self.comm.rank}: {type(error).__name__}: {error}", file=sys.stderr, flush=True)
+            self.comm.Abort(1)
+        raise SystemExit(0)
+
+    def _next_task(self) -> tuple[str, int]:
+        task = np.empty(2, np.int64)
+        wait(self.comm.Ibcast(task), IDLE)
+        return TASKS[task[0]], int(task[1])
+
+    def _do(self, task: str, detail: int) -> None:
+        member, comm = self.member, self.comm
+        if task == "take":
+            member.take(comm.scatter(None))
+        elif task == "begin":
+            member.begin(comm.scatter(None))
+        elif task == "restore":
+            member.restore(*comm.scatter(None))
+        elif task == "gather":
+            comm.gather(member.field(FIELDS[detail]))
+        elif task == "deletions":
+            comm.gather(member.new_deletions())
+        elif task == "peaks":
+            comm.gather(peak_rss_mb())
+        elif task == "memory":
+            comm.gather(member.memory())
+        else:
+            getattr(member, task)()
+
+
+#: fields that can be gathered
+FIELDS = ("u", "v", "a", "gamma", "W_max", "deleted", "sink", "reaction")

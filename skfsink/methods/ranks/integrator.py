@@ -1,0 +1,189 @@
+"""The explicit integrator of a body in parts, as a run on the first rank sees it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from ...fields.body import Body, BodyControls
+from ...fields.state import State
+from ...loads.schedule import Loading
+from ..controls import EventControls
+from ..integrators import INTEGRATORS, Integrator
+from .crew import Crew
+from .part import check_parts, parts_of
+from .partition import check_ranks
+from .world import world
+
+__all__ = ["InParts", "integrator_of", "ranks_text", "refuse"]
+
+MOVING, DENSITY = ("u", "v", "a", "W_max"), ("gamma", "sink")
+NODAL = {"reaction", "viscous"}  # of the memory of an integrator
+
+
+def integrator_of(name: str, body: Body, controls: EventControls) -> Integrator:
+    """The integrator of an event: that of a body in parts where there are several ranks, and it has one."""
+    comm = world()
+    if comm is None or name != "explicit":
+        return INTEGRATORS[name].of(body, controls)
+    return InParts(body, controls, Crew(comm))
+
+
+def ranks_text(analysis: str, integrator: str) -> str:
+    """What the ranks that there are do; empty for one."""
+    comm = world()
+    if comm is None:
+        return ""
+    if (analysis, integrator) == ("dynamic", "explicit"):
+        return f"{comm.size} ranks: one loads the body, all of them compute its event"
+    return f"{comm.size} ranks: one computes all of it, the others wait; parts know the explicit event alone"
+
+
+def refuse(analysis: str, integrator: str, loading: Loading, controls: BodyControls, elements: int) -> None:
+    """Refuse an event that the ranks that there are cannot compute, before the body is loaded (ParameterError)."""
+    comm = world()
+    if comm is not None and analysis != "quasistatic" and integrator == "explicit":
+        check_ranks(comm.size, elements)
+        check_parts(loading, controls)
+
+
+class InParts:
+    """See :class:`.Integrator` and :class:`.Explicit`.
+
+    What changes in the parts is fetched when it is asked for: fields of the state, the reaction, and with the
+    displacement what the momentum balance of the whole body knows at it.
+
+    Memory: that of all ranks: after `begin` or `restore`, `run`, `sync` and `reaction` are of the state last stepped.
+    """
+
+    factorisations = 0
+
+    def __init__(self, body: Body, controls: EventControls, crew: Crew) -> None:
+        self.body, self.crew = body, crew
+        crew.take(parts_of(body, controls.explicit, crew.size))
+        self._own, self._reaction = crew.member.explicit, np.zeros((0, 0))
+        self._state: State | None = None
+
+    @classmethod
+    def of(cls, body: Body, controls: EventControls) -> Integrator:
+        """See :func:`integrator_of`."""
+        return integrator_of("explicit", body, controls)
+
+    # --- what a run asks ---
+    @property
+    def dt(self) -> float:
+        """The current step [s]."""
+        return self._own.dt
+
+    @property
+    def rejected(self) -> int:
+        """Steps that were made again at half length."""
+        return self._own.rejected
+
+    @property
+    def added_mass(self) -> float:
+        """Of the smallest elements, over that of the intact body."""
+        return self._own.added_mass
+
+    @property
+    def reaction(self) -> np.ndarray:
+        """(n, dim) internal and viscous force less the loads, as it is now."""
+        if not self._reaction.size:
+            self._reaction = self._fetch("reaction")
+        return self._reaction
+
+    @property
+    def solves(self) -> int:
+        """Solves for gamma in the parts."""
+        return self._own.density.solves
+
+    def cost(self) -> dict[str, Any]:
+        """What each rank has used of memory [MB], and how often they have told each other something.
+
+        `halos` are sums at the nodes between parts, `sums` numbers that all parts give.
+        """
+        exchange = self.crew.member.exchange
+        return {"peak_rss_mb": [round(peak, 1) for peak in self.crew.peaks()], "halos": exchange.halos,
+                "sums": exchange.sums_made, "gamma_iterations": self._own.density.iterations}
+
+    def begin(self, state: State) -> None:
+        """Set the body in motion."""
+        self.crew.begin(state)
+        self._renew(state, True)
+
+    def run(self, state: State, t_end: float) -> Iterator[State]:
+        """Step until `t_end` [s], yielding the state after each step."""
+        while state.time < t_end:
+            part = self.crew.member.state
+            gamma = part.gamma
+            self.crew.step()
+            self._renew(state, part.gamma is not gamma)
+            yield state
+
+    def step_share(self, state: State) -> float:
+        """The step over the stability limit as the body is now."""
+        return self.crew.share()
+
+    def sync(self, state: State) -> None:
+        """Bring `state.W_max` up to date."""
+        self.crew.sync()
+        state.put_off("W_max", fetch=self._fetch)
+
+    def _renew(self, state: State, solved: bool) -> None:
+        """Bring clocks and energies of the whole body up to date, and put off its fields."""
+        part = self.crew.member.state
+        state.time, state.grip, state.step, state.ledger = part.time, part.grip, part.step, part.ledger
+        state.put_off(*MOVING, fetch=self._fetch)
+        if solved:
+            state.put_off(*DENSITY, fetch=self._fetch)
+            new = self.crew.new_deletions()
+            state.deletions.extend(new)
+            state.deleted[[element for _, element in new]] = True
+        self.body.momentum.least_J = self.crew.member.body.momentum.least_J
+        self._reaction, self._state = np.zeros((0, 0)), state
+
+    def _fetch(self, name: str) -> Any:
+        if name == "W_max":
+            self.crew.sync()
+        value = self.crew.gather(name)
+        if name == "u" and self._state is not None and value is not None:  # for those who look at stresses and energies
+            momentum = self.body.momentum
+            momentum.set_gamma(self._state.gamma, self._state.deleted)
+            momentum.force(value)
+        return value
+
+    # --- checkpoints ---
+    def memory(self) -> dict[str, np.ndarray]:
+        """What the integrator remembers, by numbers of the whole body: as :meth:`.Explicit.memory` gives it."""
+        memories = self.crew.memories()
+        first = memories[0]
+        mode: np.ndarray = np.empty(sum(memory["numbers"].size for memory in memories))
+        for memory in memories:
+            mode[memory["numbers"]] = memory["mode"]
+        whole = {name: value for name, value in first.items() if name != "numbers"} | {"mode": mode}
+        for name in NODAL.intersection(first):
+            whole[name] = self._whole(name, memories)
+        return whole
+
+    def _whole(self, name: str, memories: list[dict[str, np.ndarray]]) -> np.ndarray:
+        whole: np.ndarray = np.empty_like(self.body.space.X)
+        for part, memory in zip(self.crew.numbers, memories):
+            whole[part.nodes] = memory[name]
+        return whole
+
+    def restore(self, state: State, memory: dict[str, np.ndarray]) -> None:
+        """Go on where :meth:`memory` was taken, on any number of ranks."""
+        dim, free = self.body.space.dim, self.body.free
+        number = np.cumsum(free) - 1
+        memories = []
+        for part in self.crew.numbers:
+            dofs = (part.nodes[:, None] * dim + np.arange(dim)).ravel()
+            own = number[dofs[free[dofs]]]
+            memories.append({**memory, "mode": memory["mode"][own]})
+            for name in NODAL.intersection(memory):
+                memories[-1][name] = memory[name][part.nodes]
+        self.body.take(state)
+        self.crew.restore(state, memories)
+        self._renew(state, False)

@@ -1,0 +1,119 @@
+"""A part of a body on one rank: made from the whole on the rank that leads, and sent to the one that has it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import skfem
+
+from ...errors import ParameterError
+from ...fem.backend import BulkViscosity
+from ...fem.space import Space
+from ...fields.body import Body, BodyControls
+from ...fields.density import DensitySolver
+from ...fields.momentum import Momentum
+from ...fields.state import State
+from ...loads.schedule import Loading
+from ...material import Material, SinkLaw
+from ...material.regions import Region
+from ..controls import ExplicitControls
+from .mpi import MPIExchange
+from .partition import Numbers, numbers, partition
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
+__all__ = ["PartOfBody", "check_parts", "parts_of", "state_of"]
+
+NODAL, ELEMENTAL = ("u", "v", "a", "gamma"), ("W_max", "deleted", "sink")
+
+
+@dataclass(frozen=True)
+class PartOfBody:
+    """All that a rank needs to know of its part.
+
+    Attributes
+    ----------
+    mesh: elements and nodes of the part.   n_nodes: of the whole body.
+    momentum, density: further arguments of the balances.
+    """
+
+    numbers: Numbers
+    n_nodes: int
+    mesh: skfem.Mesh
+    axisymmetric: bool
+    material: Material
+    sink_law: SinkLaw
+    regions: tuple[Region, ...]
+    momentum: Mapping[str, Any]
+    density: Mapping[str, Any]
+    loading: Loading
+    deletion: float
+    controls: ExplicitControls
+
+    def body(self, comm: MPI.Intracomm) -> Body:
+        """The part as a body whose balances tell the others what they have to."""
+        space = Space(self.mesh, self.axisymmetric, MPIExchange(comm, self.numbers, self.n_nodes))
+        momentum = Momentum(space, self.material, regions=self.regions, **self.momentum)
+        density = DensitySolver(space, self.sink_law, regions=self.regions, solver="jacobi", **self.density)
+        return Body(momentum, density, self.loading, self.deletion)
+
+
+def check_parts(loading: Loading, controls: BodyControls) -> None:
+    """Refuse what parts of a body do not know (ParameterError)."""
+    what = ("contact" if controls.contact else "pressures and fillings" if loading.followers is not None
+            else "dead loads" if loading.dead is not None else "planes of an oblique direction" if loading.sliding
+            is not None else "grips that turn" if loading.turns else "kernels forms" if controls.kernels != "compiled"
+            else "the consistent sink" if controls.sink == "consistent" else "")
+    if what:
+        raise ParameterError(f"several ranks do not know {what}: start it on one rank")
+
+
+def parts_of(body: Body, controls: ExplicitControls, ranks: int) -> list[PartOfBody]:
+    """The parts of a body, one for each rank.
+
+    Raises
+    ------
+    ParameterError
+        There are more ranks than elements.
+    """
+    space, momentum, density = body.space, body.momentum, body.density
+    found = []
+    for part in numbers(space.conn, partition(space.conn, ranks)):
+        here = np.full(space.n_nodes, -1)
+        here[part.nodes] = np.arange(part.nodes.size)
+        mesh = type(space.mesh)(np.ascontiguousarray(space.X[part.nodes].T),
+                                np.ascontiguousarray(here[space.mesh.t[:, part.elements]]))
+        absent = np.flatnonzero(np.isin(part.elements, density.absent))
+        found.append(PartOfBody(
+            part, space.n_nodes, mesh, space.axisymmetric, momentum.material, density.law,
+            _regions(body, part.elements),
+            {"element": momentum.element, "force_floor": momentum.force_floor,
+             "bulk_viscosity": BulkViscosity(*momentum.bulk_viscosity)},
+            {"sink": density.sink, "unchanged": density.unchanged, "gradient": density.gradient, "absent": absent,
+             "active_zone": density.zone is not None},
+            body.loading.of_nodes(part.nodes), body.deletion, controls))
+    return found
+
+
+def _regions(body: Body, elements: np.ndarray) -> tuple[Region, ...]:
+    """The regions of a body that have some of `elements` (m,), by their numbers among these."""
+    regions = []
+    for region in body.momentum.regions:
+        own = np.flatnonzero(np.isin(elements, region.elements))
+        if own.size:
+            regions.append(Region(region.name, own, region.material, region.sink_law))
+    return tuple(regions)
+
+
+def state_of(state: State, part: Numbers) -> State:
+    """The part of a state; its log of failed elements begins anew."""
+    arrays, values = state.stored()
+    mine = {name: np.ascontiguousarray(arrays[name][part.nodes]) for name in NODAL}
+    mine |= {name: np.ascontiguousarray(arrays[name][part.elements]) for name in ELEMENTAL if name in arrays}
+    return State.restored(mine, {**values, "deletions": []})
+
+

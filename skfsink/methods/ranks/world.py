@@ -1,0 +1,47 @@
+"""The ranks that this program was started on, by `mpiexec -n 4 skfsink run scene.toml`: all of them, as one."""
+
+from __future__ import annotations
+
+import os
+from functools import cache
+from typing import TYPE_CHECKING
+
+from ...errors import ParameterError
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
+__all__ = ["SIZES", "world"]
+
+#: variables with the number of ranks that MPICH and its kin, Open MPI, and MVAPICH set
+SIZES = ("PMI_SIZE", "OMPI_COMM_WORLD_SIZE", "MV2_COMM_WORLD_SIZE")
+NUMBERS = ("PMI_RANK", "OMPI_COMM_WORLD_RANK", "MV2_COMM_WORLD_RANK")
+
+
+@cache
+def world() -> MPI.Intracomm | None:
+    """All ranks; None where there is one alone. MPI is loaded only where there are several.
+
+    Raises
+    ------
+    ParameterError
+        There are several, and mpi4py cannot be loaded, or is that of another MPI.
+    """
+    asked = next((int(os.environ[name]) for name in SIZES if os.environ.get(name, "").isdigit()), 1)
+    if asked <= 1:
+        return None
+    try:
+        from mpi4py import MPI
+    except (ImportError, RuntimeError) as error:
+        raise ParameterError(f"{asked} ranks were started, and mpi4py cannot be loaded ({error}): install skfsink with "
+                             f"its extra mpi, or run on one rank") from None
+    comm = MPI.COMM_WORLD
+    if comm.size != asked:
+        raise ParameterError(f"mpiexec has started {asked} ranks, and mpi4py sees {comm.size}: it is of another MPI; "
+                             f"take the mpiexec of the same environment")
+    return comm
+
+
+def first() -> bool:
+    """Whether this is the rank that speaks, also where MPI cannot be loaded."""
+    return all(os.environ.get(name, "0") == "0" for name in NUMBERS)

@@ -1,0 +1,135 @@
+"""Conjugate gradients with multigrid in the place of factors: the same steps, in a number that does not grow."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bodies import box
+from plates import SMALL, invoke
+
+from skfsink.errors import ConvergenceError, ParameterError
+from skfsink.fem.direct import Factorization
+from skfsink.fem.linear import LINEAR, solver
+from skfsink.fem.multigrid import Multigrid, rigid_motions
+from skfsink.fem.pattern import Pattern
+from skfsink.fem.space import Space
+from skfsink.fields.momentum import Momentum
+from skfsink.material import AAA
+from skfsink.methods.newton import Newton
+from skfsink.results.history import History
+
+HAS_PETSC = importlib.util.find_spec("petsc4py") is not None
+NAMES = [name for name in LINEAR if name != "direct" and (HAS_PETSC or "petsc" not in name)]
+
+
+def held(space: Space) -> np.ndarray:
+    """Unknowns that are free: the bottom is held, the left slides, so that some nodes are free in a part of them."""
+    free = np.ones(space.X.shape, bool)
+    free[space.X[:, 1] == 0] = False
+    free[space.X[:, 0] == 0, 0] = False
+    return free.ravel()
+
+
+def system(space: Space) -> tuple[Pattern, np.ndarray, np.ndarray, np.ndarray]:
+    """Pattern, free unknowns, tangent of a stretched body and a right-hand side."""
+    free = held(space)
+    pattern = Pattern(space, space.dim, free, upper=True)
+    u = np.zeros_like(space.X)
+    u[:, 1] = 0.05 * space.X[:, 1]
+    u[:, [i for i in range(space.dim) if i != 1]] = (1.05 ** (-1 / (space.dim - 1)) - 1) * np.delete(space.X, 1, axis=1)
+    rhs = np.sin(1.0 + 2.4 * np.arange(pattern.size))
+    return pattern, free, Momentum(space, AAA(bulk_modulus=50.0)).tangent(pattern, u), rhs
+
+
+def test_rigid_motions_strain_nothing(space: Space) -> None:
+    """Fails if one of them is missing, or is none: the tangent of the undeformed body is blind to them all."""
+    pattern = Pattern(space, space.dim, upper=True)
+    K = pattern.symmetric(Momentum(space, AAA()).tangent(pattern, np.zeros_like(space.X)))
+    motions = rigid_motions(space.X)
+    assert np.linalg.matrix_rank(motions) == motions.shape[1] == {2: 3, 3: 6}[space.dim]
+    assert np.abs(K @ motions).max() < 1e-12 * np.abs(K.data).max()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_solution_is_that_of_factors(name: str, space: Space) -> None:
+    """Fails if unknowns of nodes that are held in a part get to a wrong place, or columns are mixed up."""
+    pattern, free, data, b = system(space)
+    multigrid, factors = solver(name, space, free, pattern, 1), Factorization(pattern)
+    assert multigrid.factorize(data) and factors.factorize(data)
+    expected = factors.solve(b)
+    assert np.abs(multigrid.apply(b) - expected).max() < 1e-7 * np.abs(expected).max()
+    B = np.stack([b, np.roll(b, 3)], axis=1)
+    assert np.abs(multigrid.apply(B) - factors.apply(B)).max() < 1e-6 * np.abs(expected).max()
+    summed = factors.solve_sum(B, b)
+    assert np.abs(multigrid.solve_sum(B, b) - summed).max() < 1e-6 * np.abs(summed).max()
+    multigrid.release()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_iterations_do_not_grow_with_the_body(name: str) -> None:
+    """Fails if the hierarchy is not given the rigid motions: a body twice as large then takes far more iterations."""
+    counts = []
+    for n in (9, 18):
+        space = box("hex", n, 0.0)
+        pattern, free, data, b = system(space)
+        multigrid = solver(name, space, free, pattern, 1)
+        multigrid.factorize(data)
+        _, iterations, met = multigrid.conjugate(data, b, 1e-6, 300)
+        assert met
+        counts.append(iterations)
+    assert counts[0] > 10 and counts[1] < 1.5 * counts[0] < 120, counts
+
+
+def test_a_matrix_that_curves_down(space: Space) -> None:
+    """Fails if a direction in which the energy falls without bound is followed, or taken for a solution."""
+    pattern, free, data, b = system(space)
+    multigrid = Multigrid(space, free, pattern)
+    multigrid.factorize(data)
+    bent = -data
+    x, iterations, met = multigrid.conjugate(bent, b, 1e-6, 50)
+    assert (iterations, met, multigrid.definite) == (0, False, False) and not x.any()
+    with pytest.raises(ConvergenceError, match="--linear direct"):
+        multigrid.factorize(bent)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_equilibrium_is_that_of_factors(name: str, space: Space) -> None:
+    """Fails if a step of Newton's method with multigrid leads elsewhere, from a state far from equilibrium."""
+    free, found = held(space), []
+    top = space.X[:, 1] == space.X[:, 1].max()
+    mask = free.reshape(space.X.shape).copy()
+    mask[top] = False
+    for linear in ("direct", name):
+        u = np.zeros_like(space.X)
+        u[top, 1], u[top, 0] = 0.4, 0.2
+        newton = Newton(Momentum(space, AAA()), mask.ravel(), 1e-10, 60, linear=linear)
+        found.append(newton.equilibrium(u)[0])
+        assert newton.steps > 3
+    assert np.abs(found[1] - found[0]).max() < 1e-8
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_body_is_loaded_to_the_same_onset(name: str, mesh: Path, tmp_path: Path) -> None:
+    """Fails if the option does not reach the statics, or another onset is found."""
+    rows = []
+    for linear in ("direct", name):
+        folder = tmp_path / linear
+        status, said, _ = invoke("--mesh", mesh, *SMALL, "--event-time", "1e-7", "--linear", linear, "--out", folder)
+        assert status == 0, said
+        history = History.load(folder / "history.csv")
+        rows.append([history[key][history["phase"] == "loading"][-1] for key in ("grip_displacement_mm", "elastic")])
+    assert rows[1] == pytest.approx(rows[0], rel=1e-6)
+
+
+def test_words_that_are_none(tmp_path: Path) -> None:
+    """Fails if an unknown solver is taken, or a missing PETSc is found out late."""
+    status, said, _ = invoke("--linear", "lu", "--out", tmp_path / "run")
+    assert (status, said) == (2, "skfsink: linear must be one of direct, multigrid, petsc-gamg; got 'lu'\n")
+    if not HAS_PETSC:
+        space = box("quad", 3)
+        pattern = Pattern(space, 2, held(space), upper=True)
+        with pytest.raises(ParameterError, match=r"linear petsc-gamg needs petsc4py .*: install it, or take"):
+            solver("petsc-gamg", space, held(space), pattern, 1)

@@ -1,0 +1,233 @@
+"""Bodies in parts on several ranks: the parts, and whole runs by `mpiexec`, killed and resumed on other numbers."""
+
+from __future__ import annotations
+
+import csv
+import importlib.util
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bodies import box
+from plates import SMALL, invoke
+
+from skfsink.errors import ParameterError
+from skfsink.fem.space import Space
+from skfsink.fields.density import DensitySolver
+from skfsink.material import SinkLaw
+from skfsink.methods.ranks.partition import numbers, partition
+
+HERE = Path(__file__).resolve().parent
+MPIEXEC = shutil.which("mpiexec", path=os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")]))
+ranks = pytest.mark.skipif(MPIEXEC is None or importlib.util.find_spec("mpi4py") is None,
+                           reason="no mpi4py with its mpiexec: install the extra mpi")
+metis = pytest.mark.skipif(importlib.util.find_spec("pymetis") is None, reason="no pymetis: install the extra mpi")
+ARGUMENTS = [*SMALL, "--analysis", "dynamic", "--event-time", "4e-5", "--density-solver", "jacobi",
+             "--checkpoint-every", "0.05"]
+
+
+def on(count: int, *arguments: str | Path) -> list[str]:
+    """A command of Python on some ranks."""
+    return [str(MPIEXEC), "-n", str(count), sys.executable, *map(str, arguments)]
+
+
+def case(*arguments: str | Path) -> list[str | Path]:
+    """Arguments of Python for a run of the notched plate."""
+    return ["-m", "skfsink.cases.single_edge_notch", *arguments]
+
+
+def case_alone(*arguments: str | Path) -> list[str]:
+    """A command of Python for a run of the notched plate on one rank."""
+    return [sys.executable, *map(str, case(*arguments))]
+
+
+def finished(command: list[str], status: int = 0) -> str:
+    """What a command that ends with a status says of errors."""
+    done = subprocess.run(command, capture_output=True, text=True, timeout=500, check=False, cwd=HERE.parent)
+    assert done.returncode == status, done.stdout + done.stderr
+    return done.stderr
+
+
+# --- the parts ---
+@metis
+@pytest.mark.parametrize("parts", [2, 3, 7])
+def test_every_element_is_in_one_part_and_every_node_counts_once(space: Space, parts: int) -> None:
+    """Fails if an element or a node is lost or counted twice, or two parts order the nodes between them differently."""
+    found = numbers(space.conn, partition(space.conn, parts))
+    assert len(found) == parts
+    assert sorted(np.concatenate([part.elements for part in found]).tolist()) == list(range(space.n_elements))
+    assert sorted(np.concatenate([part.nodes[:part.counted] for part in found]).tolist()) == list(range(space.n_nodes))
+    for p, part in enumerate(found):
+        assert set(part.nodes) == set(space.conn[part.elements].ravel())
+        for q, nodes in part.shared.items():
+            other = found[q]
+            assert (part.nodes[nodes] == other.nodes[other.shared[p]]).all()
+            assert set(part.nodes[nodes]) == set(part.nodes) & set(other.nodes)
+
+
+@metis
+def test_parts_are_even_and_their_borders_short() -> None:
+    """Fails if METIS gets another graph than that of elements with a common side."""
+    space = box("quad", 20, 0.0)
+    part = partition(space.conn, 2)
+    assert abs(np.bincount(part) - 200).max() <= 8
+    shared = numbers(space.conn, part)[0].shared[1]
+    assert shared.size <= 30  # 21 across the middle
+
+
+@metis
+def test_more_ranks_than_elements() -> None:
+    """Fails if a rank may be left without a part."""
+    with pytest.raises(ParameterError, match="30 ranks cannot share 25 elements: start at most as many"):
+        partition(box("quad", 5).conn, 30)
+    assert sorted(np.unique(partition(box("quad", 2).conn, 4))) == [0, 1, 2, 3]
+
+
+def test_the_diagonal_preconditions_as_well_as_multigrid(space: Space) -> None:
+    """Fails if conjugate gradients with the diagonal come to another density, with points that are dead."""
+    law = SinkLaw(length_scale=0.3)
+    W_max = np.zeros_like(space.w)
+    W_max[:3] = [[1e3 * law.phi], [1.2 * law.phi], [law.phi]]
+    one = np.ones(space.n_nodes)
+    expected = DensitySolver(space, law, tolerance=1e-12).solve(W_max, one)
+    jacobi = DensitySolver(space, law, tolerance=1e-12, solver="jacobi")
+    assert np.abs(jacobi.solve(W_max, one) - expected).max() < 1e-11
+    assert 0 < jacobi.iterations < 100
+
+
+def test_an_unknown_solver_of_the_density(tmp_path: Path) -> None:
+    """Fails if a word is taken that means nothing."""
+    status, said, _ = invoke("--density-solver", "amg", "--out", tmp_path / "run")
+    assert (status, said) == (2, "skfsink: density_solver must be one of multigrid, jacobi; got 'amg'\n")
+
+
+# --- all ranks ---
+@ranks
+@pytest.mark.parametrize("count", [2, 3])
+def test_parts_add_up_to_the_whole_body(count: int) -> None:
+    """Fails if a sum, a copy or a decision differs from that of the whole body on any rank; see `on_ranks.py`."""
+    finished(on(count, HERE / "on_ranks.py"))
+
+
+@ranks
+@pytest.mark.parametrize("option, said", [
+    ("--contact", "contact"), ("--kernels=forms", "kernels forms"), ("--sink=consistent", "the consistent sink")])
+def test_what_several_ranks_do_not_know(option: str, said: str, mesh: Path, tmp_path: Path) -> None:
+    """Fails if a body is loaded first, or an option is left out without a word."""
+    text = finished(on(2, *case("--mesh", mesh, *SMALL, option, "--out", tmp_path / "run")), 2)
+    assert text == f"skfsink: several ranks do not know {said}: start it on one rank\n"
+    assert not (tmp_path / "run").exists()
+
+
+@ranks
+def test_one_line_and_not_one_a_rank(tmp_path: Path) -> None:
+    """Fails if ranks all say what is wrong, or some of them go on waiting."""
+    said = finished(on(3, *case("--mesh", tmp_path / "none.vtu", "--out", tmp_path / "run")), 2)
+    assert said.count("skfsink:") == 1 and "none.vtu" in said
+
+
+def test_ranks_without_mpi(tmp_path: Path) -> None:
+    """Fails if a rank that cannot load MPI says nothing, all of them do, or each runs by itself."""
+    (tmp_path / "mpi4py.py").write_text("raise ImportError('none here')\n")
+    for rank, lines in ((0, 1), (1, 0)):
+        done = subprocess.run(
+            [sys.executable, *map(str, case("--out", tmp_path / "run"))], capture_output=True, text=True, check=False,
+            env={**os.environ, "PMI_SIZE": "2", "PMI_RANK": str(rank),
+                 "PYTHONPATH": os.pathsep.join([str(tmp_path), str(HERE.parent)])})
+        assert done.returncode == 2 and done.stderr.count("\n") == lines, done.stderr
+        assert lines == 0 or "2 ranks were started, and mpi4py cannot be loaded (none here): install" in done.stderr
+    assert not (tmp_path / "run").exists()
+
+
+@ranks
+@pytest.mark.slow
+def test_runs_on_several_ranks_are_those_on_one(mesh: Path, tmp_path: Path) -> None:
+    """Fails if the number of ranks decides anything: the histories agree, and twice on two ranks to the last bit."""
+    for name, count in (("one", 1), ("two", 2), ("again", 2), ("three", 3)):
+        command = on(count, *case("--mesh", mesh, *ARGUMENTS, "--out", tmp_path / name))
+        finished(command if count > 1 else command[3:])
+    assert (tmp_path / "two" / "history.csv").read_bytes() == (tmp_path / "again" / "history.csv").read_bytes()
+    one = _rows(tmp_path / "one")
+    for name in ("two", "three"):
+        _check_same(_rows(tmp_path / name), one)
+        assert (tmp_path / name / "deletions.csv").read_text().count("\n") > 3
+
+
+@ranks
+@pytest.mark.slow
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_a_lost_rank_ends_all_and_the_run_goes_on(count: int, mesh: Path, tmp_path: Path) -> None:
+    """Fails if a run waits for a rank that is gone, or its checkpoint is of that number of ranks alone."""
+    finished(on(2, *case("--mesh", mesh, *ARGUMENTS, "--out", tmp_path / "whole")))
+    run, choose = tmp_path / "run", random.Random(count)
+    with subprocess.Popen(on(2, *case("--mesh", mesh, *ARGUMENTS, "--out", run)), cwd=HERE.parent,
+                          stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, start_new_session=True) as program:
+        while not (run / "onset.npz").exists() and program.poll() is None:
+            time.sleep(0.05)
+        time.sleep(choose.uniform(0.5, 3.0))
+        victims = _ranks_of(program.pid)
+        if program.poll() is None and victims:
+            os.kill(choose.choice(victims), signal.SIGKILL)
+        program.communicate(timeout=60)
+    goes_on = on(count, *case("--resume", run))
+    finished(goes_on if count > 1 else goes_on[3:])
+    _check_same(_rows(run), _rows(tmp_path / "whole"))
+
+
+def _ranks_of(pid: int) -> list[int]:
+    """Processes of Python below one of `mpiexec`."""
+    import psutil
+    return [child.pid for child in psutil.Process(pid).children(recursive=True) if "python" in child.name()]
+
+
+def _rows(folder: Path) -> list[dict[str, str]]:
+    with open(folder / "history.csv", newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def _check_same(rows: list[dict[str, str]], expected: list[dict[str, str]]) -> None:
+    """Same steps, energies and crack, up to what sums in another order do in a body that fails."""
+    assert len(rows) == len(expected) > 20
+    for name in expected[0]:
+        if name == "phase" or name.startswith("balance"):
+            assert name != "phase" or [row[name] for row in rows] == [row[name] for row in expected]
+            continue
+        one, other = (np.array([float(row[name] or "nan") for row in table]) for table in (rows, expected))
+        scale = np.nanmax(np.abs(other), initial=0.0) or 1.0
+        np.testing.assert_allclose(one / scale, other / scale, atol=1e-6, err_msg=name)
+
+
+@ranks
+def test_a_script_runs_on_the_first_rank(tmp_path: Path) -> None:
+    """Fails if all ranks run a script, or one that ends with an error leaves the others waiting."""
+    script = tmp_path / "script.py"
+    script.write_text("import sys\nprint('once', sys.argv[1:], file=sys.stderr)\n")
+    assert finished(on(2, "-m", "skfsink.methods.ranks", script, "a")).count("once ['a']") == 1
+    script.write_text("raise ValueError('of the script')\n")
+    assert "ValueError: of the script" in finished(on(2, "-m", "skfsink.methods.ranks", script), 1)
+
+
+@ranks
+@pytest.mark.slow
+def test_an_end_of_time_leaves_a_checkpoint(mesh: Path, tmp_path: Path) -> None:
+    """Fails if SIGTERM to `mpiexec` ends ranks before the first one has written, or is not told in one line."""
+    run = tmp_path / "run"
+    with subprocess.Popen(on(2, *case("--mesh", mesh, *ARGUMENTS[:-1], "1e6", "--out", run)),
+                          cwd=HERE.parent, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as program:
+        while not (run / "onset.npz").exists() and program.poll() is None:
+            time.sleep(0.05)
+        time.sleep(1.0)
+        before = (run / "checkpoint.npz").stat().st_mtime_ns
+        program.send_signal(signal.SIGTERM)
+        _, said = program.communicate(timeout=60)
+    assert (run / "checkpoint.npz").stat().st_mtime_ns > before
+    assert said.count("interrupted; go on with skfsink resume") == 1, said
+    finished(case_alone("--resume", run))
+    assert (run / "summary.json").exists()
