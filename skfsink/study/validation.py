@@ -25,7 +25,9 @@ from ..run.display import Display
 from .part import Part, Planned, Points
 from .speed_accuracy import run_parts
 from .store import Store
+from .validation_branching import draw_branching, plan_branching, rows_branching
 from .validation_cavitation import draw_cavitation, plan_cavitation, rows_cavitation
+from .validation_peeling import draw_peeling, plan_peeling, rows_peeling
 from .validation_pulses import draw_pulses, plan_pulses, rows_pulses
 from .validation_table import Row, lines, renew
 from .validation_tearing import draw_tearing, plan_tearing, rows_tearing
@@ -47,7 +49,9 @@ class Known(NamedTuple):
 
 KNOWN = {"pulses": Known(plan_pulses, draw_pulses, rows_pulses),
          "tearing": Known(plan_tearing, draw_tearing, rows_tearing),
-         "cavitation": Known(plan_cavitation, draw_cavitation, rows_cavitation)}
+         "cavitation": Known(plan_cavitation, draw_cavitation, rows_cavitation),
+         "branching": Known(plan_branching, draw_branching, rows_branching),
+         "peeling": Known(plan_peeling, draw_peeling, rows_peeling)}
 FLAG = Parameter(negative="", show_default=False)
 
 
@@ -57,7 +61,7 @@ def rows_of(points: Points) -> list[Row]:
         {key.partition("/")[2]: point for key, point in points.items() if key.startswith(f"{name}/")})]
 
 
-def validation(*, only: Literal["pulses", "tearing", "cavitation"] | None = None,
+def validation(*, only: Literal["pulses", "tearing", "cavitation", "branching", "peeling"] | None = None,
                quick: Annotated[bool, FLAG] = False, fresh: Annotated[bool, FLAG] = False,
                out: Path = Path("results/study/validation"), page: Path | None = None,
                quiet: Annotated[bool, FLAG] = False) -> None:
