@@ -128,6 +128,7 @@ def test_limiter_of_glass(monkeypatch: pytest.MonkeyPatch) -> None:
         assert 0.6 * SinkLaw(phi=limiter(l)).failure_energy * l == pytest.approx(TOUGHNESS, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_deck_of_the_branching_plate_starts_in_time(tmp_path: Path) -> None:
     """Fails if the crack of the deck has gone l before 10 us or not by 13 us; the closed form has it start at 10.7."""
     text = shipped_decks()["branching_plate"].read_text(encoding="utf-8")
@@ -153,7 +154,7 @@ def test_strip_of_glass() -> None:
 def test_strength_across_the_layers() -> None:
     """Fails if the limiter does not give the strength that was measured, or the fibres do not lie in the layers."""
     assert strength_across(radial_limiter()).stress == pytest.approx(STRENGTH, rel=1e-4)
-    assert strength_across(2 * radial_limiter()).stress > 1.5 * STRENGTH
+    assert strength_across(radial_limiter()).at > 1.5  # 1.25 along the fibres' axis, where they stretch at once
 
 
 def test_peel_takes_twice_its_force() -> None:
@@ -173,6 +174,8 @@ def test_rows_say_what_disagrees() -> None:
     assert [row.agrees for row in rows_branching({"plate/1": plate})] == [True] * 4 + [None]
     late = {**plate, "start_s": 15e-6, "branch_s": None, "arrival_s": 60e-6, "speed_over_rayleigh": [0.7, 0.8]}
     assert [row.agrees for row in rows_branching({"plate/1": late})] == [False] * 4 + [None]
+    early = {**plate, "branch_s": 20e-6}
+    assert [row.agrees for row in rows_branching({"plate/1": early, "plate/0.5": plate})][1] is None
     peel = {"length_scale_mm": 0.3, "per_length": 4, "phi_MPa": 0.007, "energy_over_band": 0.3,
             "force_mN_per_mm": 23.0, "energy_N_per_mm": 0.05}
     assert [row.agrees for row in rows_peeling({"l/0.3/4": peel, "fit": {**peel, "strength_MPa": 10.0}})] == [

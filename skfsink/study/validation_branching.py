@@ -191,8 +191,12 @@ def rows_branching(points: Points) -> list[Row]:
     row("start (µs)", f"{expected:.1f}, half-line crack under a step (Freund 1990)", lambda p: p["start_s"], 1e6, 1,
         start is not None and abs(start * 1e6 / expected - 1) < 0.2,
         "when the tip has gone $l$; a sharp tip and no time to get going in the closed form")
+    others = [p["branch_s"] for p in plates]
+    scattered = len(others) > 1 and None not in others and abs(others[0] - others[-1]) > 5e-6
     row("branching (µs)", f"about 35 ({SOURCE})", lambda p: p["branch_s"], 1e6, 1,
-        branch is not None and abs(branch * 1e6 - 35) < 5, "when the branches are $2\\,l$ apart")
+        None if scattered else branch is not None and abs(branch * 1e6 - 35) < 5,
+        "when the branches are $2\\,l$ apart" + ("; the two meshes differ by more than would say anything"
+                                                if scattered else ""))
     row("tip at an edge (µs)", f"about 80 ({SOURCE})", lambda p: p["arrival_s"], 1e6, 1,
         fine["arrival_s"] is not None and abs(fine["arrival_s"] * 1e6 - 80) < 10,
         f"the leading tip is at $x$ = {fine['arrival_mm']:.0f} mm then, and the published one at the right edge")

@@ -65,7 +65,7 @@ def strength_across(phi: float) -> Peak:
 @cache
 def radial_limiter() -> float:
     """The limiter Phi [MPa] with the measured strength."""
-    return float(brentq(lambda phi: strength_across(phi).stress - STRENGTH, 1e-3, 0.05, xtol=1e-8))
+    return float(brentq(lambda phi: strength_across(phi).stress - STRENGTH, 4e-3, 0.02, xtol=1e-7))
 
 
 def arm_sample(h: float) -> Sample:
