@@ -61,7 +61,7 @@ STEPS: dict[str, Step] = {step.name: step for step in (
     _study("notch", 0.4, "notch.png"),
     _study("speed_accuracy", 2.5, "speed_accuracy.png", *(f"speed_accuracy_{part}.png" for part in PARTS)),
     _study("stability", 0.2, *(f"stability_{failure}.png" for failure in FAILURES)),
-    Step("validation", ("-m", "skfsink.study.validation", "--page", "docs/validation.md"), 0.25,
+    Step("validation", ("-m", "skfsink.study.validation", "--page", "docs/validation.md"), 0.3,
          "results/study/validation", {"validation.json": "docs/images/validation.json"}
          | {f"validation_{part}.png": f"docs/images/validation_{part}.png" for part in KNOWN}),
     Step("ladder", ("-m", "skfsink.study.ladder", "--out", "results/study/ladder"), 1.5, "results/study/ladder",
