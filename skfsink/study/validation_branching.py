@@ -13,7 +13,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import matplotlib.pyplot as plt
 import meshio
 import numpy as np
 from scipy.spatial import cKDTree
@@ -217,7 +216,7 @@ def draw_branching(points: Points, path: Path) -> None:
             image = ax.imshow(gamma, origin="lower", extent=(CUT - 5, LENGTH, 0, HEIGHT), cmap="magma", vmin=0, vmax=1)
             ax.set(title=f"$\\gamma$ at the end, $l$ = {plate['length_scale_mm']:g} mm", xlabel="x (mm)",
                    ylabel="y (mm)")
-            plt.colorbar(image, ax=ax, shrink=0.7)
+            ax.figure.colorbar(image, ax=ax, shrink=0.7)
         for plate, style in zip(plates, (":", "--", "-")[-len(plates):]):
             label, t = f"$l$ = {plate['length_scale_mm']:g} mm", np.array(plate["time_us"])
             axes[2].plot(t, plate["way_mm"], style, color="#33658a", label=label)
