@@ -26,7 +26,9 @@ from ..run.display import Display
 from .part import Part, Planned, Points
 from .speed_accuracy import run_parts
 from .store import Store
+from .validation_branching import draw_branching, plan_branching, rows_branching
 from .validation_cavitation import draw_cavitation, plan_cavitation, rows_cavitation
+from .validation_peeling import draw_peeling, plan_peeling, rows_peeling
 from .validation_pulses import draw_pulses, plan_pulses, rows_pulses
 from .validation_running import draw_running, plan_running, rows_running
 from .validation_supershear import draw_supershear, plan_supershear, rows_supershear
@@ -52,7 +54,9 @@ KNOWN = {"pulses": Known(plan_pulses, draw_pulses, rows_pulses),
          "tearing": Known(plan_tearing, draw_tearing, rows_tearing),
          "cavitation": Known(plan_cavitation, draw_cavitation, rows_cavitation),
          "running": Known(plan_running, draw_running, rows_running),
-         "supershear": Known(plan_supershear, draw_supershear, rows_supershear)}
+         "supershear": Known(plan_supershear, draw_supershear, rows_supershear),
+         "branching": Known(plan_branching, draw_branching, rows_branching),
+         "peeling": Known(plan_peeling, draw_peeling, rows_peeling)}
 FLAG = Parameter(negative="", show_default=False)
 
 
@@ -62,7 +66,8 @@ def rows_of(points: Points) -> list[Row]:
         {key.partition("/")[2]: point for key, point in points.items() if key.startswith(f"{name}/")})]
 
 
-def validation(*, only: Literal["pulses", "tearing", "cavitation", "running", "supershear"] | None = None,
+def validation(*, only: Literal["pulses", "tearing", "cavitation", "running", "supershear", "branching",
+                                "peeling"] | None = None,
                quick: Annotated[bool, FLAG] = False, fresh: Annotated[bool, FLAG] = False,
                out: Path = Path("results/study/validation"), page: Path | None = None,
                quiet: Annotated[bool, FLAG] = False) -> None:
