@@ -39,7 +39,8 @@ def wait(request: MPI.Request, idle: float = np.inf) -> None:
 class MPIExchange:
     """See :class:`.Exchange`.
 
-    Memory: buffers and numbers, so that they are made once; `whole` and `over` depend on no earlier call.
+    Memory: counts, and buffers and numbers that are made once; `whole`, `over`, `total`, `totals`, `sums`, `greatest`,
+    `maxima`, `dot` and `norm` depend on no earlier call.
 
     Parameters
     ----------
