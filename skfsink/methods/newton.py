@@ -9,12 +9,14 @@ stable, so that the last steps are Newton's.
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from ..errors import ConvergenceError
-from ..fem.linear import solver
+from ..fem.linear import Solver, solver
 from ..fem.pattern import Pattern
 from ..fields.momentum import Momentum
 
@@ -26,7 +28,7 @@ class Newton:
 
     Memory: factors of a tangent, which later calls use as long as they serve: of which equilibrium within `tolerance`
     is found, in how many steps, depends on earlier calls to `equilibrium` and `predict`, whether their increments were
-    taken or given up. `memory` gives what they were made from.
+    taken or given up. `memory` gives what they were made from, `factorisations` counts them, `release` drops them.
 
     Parameters
     ----------
@@ -39,7 +41,7 @@ class Newton:
 
     Attributes
     ----------
-    steps: Newton steps made.   iterations: conjugate-gradient iterations.   solver: the factorisation, with its count.
+    steps: Newton steps made.   iterations: conjugate-gradient iterations.
     """
 
     LIVE = 1e-3     # nodes with less than this of their mass are not asked for equilibrium
@@ -54,8 +56,7 @@ class Newton:
                  linear: str = "direct") -> None:
         self.momentum, self.free, self.tolerance, self.most = momentum, free, tolerance, most
         self.space = momentum.space
-        self.pattern = Pattern(self.space, self.space.dim, free, upper=True)
-        self.solver = solver(linear, self.space, free, self.pattern, threads)
+        self._linear, self._threads, self._released = linear, threads, 0
         self.steps = self.iterations = 0
         self._volume = self.space.lump(np.ones_like(self.space.w))
         # a body that has come apart bears no force; this says what counts as none, in the softest material too
@@ -127,9 +128,28 @@ class Newton:
         d[self.free], _ = self._direction(u, net.ravel()[self.free], 1e-3)
         return u + move + d.reshape(u.shape)
 
+    @cached_property
+    def pattern(self) -> Pattern:
+        """Of the tangent, the upper triangle."""
+        return Pattern(self.space, self.space.dim, self.free, upper=True)
+
+    @cached_property
+    def solver(self) -> Solver:
+        """What solves for steps, with its count."""
+        return solver(self._linear, self.space, self.free, self.pattern, self._threads)
+
+    @property
+    def factorisations(self) -> int:
+        """Numerical factorisations made."""
+        return self._released + (self.solver.count if "solver" in vars(self) else 0)
+
     def release(self) -> None:
-        """Free the memory of the factors; they are made again when they are needed."""
-        self.solver.release()
+        """Free the memory of factors and pattern; they are made again when they are needed."""
+        self._released = self.factorisations
+        if "solver" in vars(self):
+            self.solver.release()
+            del self.solver
+        vars(self).pop("pattern", None)
         self._kept = None
 
     # --- directions ---

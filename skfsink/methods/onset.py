@@ -91,7 +91,7 @@ class StaticLoading:
     @property
     def factorisations(self) -> int:
         """Numerical factorisations made so far."""
-        return self.newton.solver.count
+        return self.newton.factorisations
 
     def _predict(self, u: np.ndarray, increment: float, t: float = 0.0) -> np.ndarray:
         """`u` after moving the grips from load time `t` on for a time `increment`, to first order in it.

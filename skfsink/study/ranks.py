@@ -43,6 +43,7 @@ FLAG = Parameter(negative="", show_default=False)
 H = 0.05                    # of the hexahedra [mm]: l/2
 SIZE = {"strong": (50_000, 200_000), "weak": (100_000,)}   # elements: of the body, and of each rank
 COUNTS = (1, 2, 4, 8)
+EVENT = str(Path(__file__).with_name("ranks_event.py"))
 STEPS = 150                 # about, of the event
 BODIES, CLUSTERS = (10**7, 10**8), (64, 1_024, 16_384)   # hexahedra and cores that are predicted
 LATENCY, BANDWIDTH = 2e-6, 1e10   # of a network of a cluster [s; bytes/s], assumed
@@ -102,21 +103,20 @@ class _Event:
             folder, mesh = Path(name), block(self.elements)
             meshio.write(folder / "block.vtu", mesh)
             step = 0.5 * H / 600e3  # s, of the waves of 590 m/s
-            write_atomic(folder / "scene.toml", DECK.format(time=STEPS * step, record=STEPS * step / 3))
-            start = [mpiexec, "-n", str(self.count)] if self.count > 1 else []
-            done = subprocess.run([*start, sys.executable, "-m", "skfsink", "run", str(folder / "scene.toml"), "--out",
-                                   str(folder / "run"), "--quiet"], capture_output=True, text=True, check=False)
+            write_atomic(folder / "scene.toml", DECK.format(time=STEPS * step, record=STEPS * step / 10))
+            words = [sys.executable, *(["-m", "skfsink.methods.ranks"] if self.count > 1 else []), EVENT, str(folder)]
+            done = subprocess.run([*([mpiexec, "-n", str(self.count)] if self.count > 1 else []), *words],
+                                  capture_output=True, text=True, check=False)
             if done.returncode:
                 raise SkfsinkError(f"the event of {self.elements} elements on {self.count} ranks ended: "
                                    f"{(done.stderr.strip().splitlines() or ['no message'])[-1]}")
-            summary = json.loads((folder / "run" / "summary.json").read_text(encoding="utf-8"))
-        cost = summary["cost"]
-        return {"elements": summary["elements"], "ranks": self.count, "steps": cost["steps"],
-                "event_s": cost["wall_s"]["event"], "solves": cost["gamma_solves"],
-                "peaks_mb": cost["ranks"]["peak_rss_mb"] if "ranks" in cost else [cost["peak_rss_mb"]],
-                **{name: cost["ranks"][name] if "ranks" in cost else 0 for name in (
-                    "halos", "sums", "gamma_iterations")},
-                "D": summary["energy"]["D_sink_final"], "work": summary["energy"]["external_work"]}
+            found = json.loads(done.stdout.strip().splitlines()[-1])
+        cost = found["cost"]
+        told = cost.get("ranks", {"peak_rss_mb": [cost["peak_rss_mb"]], "halos": 0, "sums": 0, "gamma_iterations": 0})
+        return {"elements": found["elements"], "ranks": self.count, "steps": cost["steps"], "step_s": found["step_s"],
+                "event_s": cost["wall_s"]["event"], "solves": cost["gamma_solves"], "peaks_mb": told["peak_rss_mb"],
+                "halos": told["halos"], "sums": told["sums"], "gamma_iterations": told["gamma_iterations"],
+                "D": found["D"]}
 
 
 def plan(quick: bool) -> list[Planned]:
@@ -133,8 +133,8 @@ def plan(quick: bool) -> list[Planned]:
 
 # --- what comes out ---
 def step_time(point: dict[str, Any]) -> float:
-    """Wall time of a step with its share of the density solves [s]."""
-    return float(point["event_s"] / point["steps"])
+    """Wall time of a step with its share of solves and records, without what begins and ends an event [s]."""
+    return float(point["step_s"])
 
 
 @dataclass(frozen=True)
