@@ -127,6 +127,10 @@ def check_event(body: Body, state: State, member: Member) -> None:
     for name, value in expected.items():
         check(f"ledger, {name}", energies[name] / scale, value / scale, 1e-8) if name != "balance" else None
     assert state.deleted.any(), "nothing has failed"
+    check("number of zones", len(member.explicit._zones), len(alone._zones), 0.0)
+    for own, whole in zip(member.explicit._zones, alone._zones):
+        check("zone", own.depth, whole.depth, 1e-6)
+        check("nodes of a zone", (own.size, own.size - own.nodes.size >= 0), (whole.size, True), 0.0)
     check("time", (member.state.time, member.state.step), (state.time, state.step), 1e-9)
 
 

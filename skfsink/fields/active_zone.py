@@ -33,11 +33,13 @@ class Zone(NamedTuple):
     ----------
     depth: of each cell [mm], zero outside.
     nodes: those in it, ascending.
+    size: their number, in the whole body.
     inner: the solver of their part of the system.
     """
 
     depth: np.ndarray
     nodes: np.ndarray
+    size: float
     inner: AmgCG | JacobiCG
 
 
@@ -123,7 +125,7 @@ class ActiveZone:
         need = exchange.maxima(need)
         fit = [zone for zone in zones if (zone.depth >= need).all()]
         if fit:
-            return min(fit, key=lambda zone: zone.nodes.size)
+            return min(fit, key=lambda zone: zone.size)
         depth = np.zeros_like(need)
         _deepen(self._centres, np.flatnonzero(need), need, self.MARGIN * self._l, depth)
         if exchange.total(int(np.count_nonzero(depth[self._cell[self._counted]]))) > self.MOST * self._size:
@@ -134,7 +136,8 @@ class ActiveZone:
     def of_depth(self, depth: np.ndarray) -> Zone:
         """The zone with these depths of the cells [mm], as a checkpoint keeps them."""
         nodes = np.flatnonzero(depth[self._cell])
-        return Zone(depth, nodes, self._solver.restricted(nodes))
+        size = self._exchange.total(int(np.count_nonzero(self._counted[nodes])))
+        return Zone(depth, nodes, size, self._solver.restricted(nodes))
 
 
 @njit(cache=True)

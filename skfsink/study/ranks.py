@@ -42,7 +42,7 @@ __all__ = ["RANKS", "ranks"]
 FLAG = Parameter(negative="", show_default=False)
 H = 0.05                    # of the hexahedra [mm]: l/2
 SIZE = {"strong": (50_000, 200_000), "weak": (100_000,)}   # elements: of the body, and of each rank
-COUNTS = (1, 2, 4, 8)
+COUNTS = {50_000: (1, 2, 4, 8), 200_000: (1, 2, 4)}   # ranks, of each body of strong scaling
 EVENT = str(Path(__file__).with_name("ranks_event.py"))
 STEPS = 150                 # about, of the event
 BODIES, CLUSTERS = (10**7, 10**8), (64, 1_024, 16_384)   # hexahedra and cores that are predicted
@@ -123,10 +123,10 @@ def plan(quick: bool) -> list[Planned]:
     """Bodies of one size on more and more ranks, and bodies that grow with them."""
     planned = []
     for size in (5_000,) if quick else SIZE["strong"]:
-        for count in COUNTS[:2] if quick else COUNTS:
+        for count in COUNTS.get(size, (1, 2)):
             planned.append(Planned(f"strong/{size}/{count}", _Event(size, count), size * 1e-3))
     for size in () if quick else SIZE["weak"]:
-        for count in COUNTS[:2]:
+        for count in (1, 2):
             planned.append(Planned(f"weak/{size}/{count}", _Event(size * count, count), size * count * 1e-3))
     return planned
 
