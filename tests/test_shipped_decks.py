@@ -202,8 +202,10 @@ def test_strips_have_the_same_tip() -> None:
 @pytest.mark.slow
 def test_tearing_of_the_strip(tmp_path: Path) -> None:
     """Fails if a running crack does not take from the strip, per length, what Rivlin and Thomas say, or is too fast."""
-    tearing = beside("pure_shear", "tearing")
-    assert invoke_program("run", "pure_shear", "--out", tmp_path / "run", "--quiet")[0] == 0
+    tearing, folder = beside("pure_shear", "tearing"), data_folder("pure_shear")
+    deck = (folder / "scene.toml").read_text(encoding="utf-8")  # the crack of its own mesh ends at a clamp
+    (tmp_path / "deck.toml").write_text(deck.replace('"meshes/cut2', f'"{folder}/meshes/cut3'), encoding="utf-8")
+    assert invoke_program("run", tmp_path / "deck.toml", "--out", tmp_path / "run", "--quiet")[0] == 0
     found = tearing.figures(skfsink.load(tmp_path / "run"))
     assert 0.7 * found["G"] < -found["elastic"] < 1.02 * found["G"]
     assert found["sink"] + 2 * found["kinetic"] == pytest.approx(found["G"], rel=0.12)
