@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ctypes
 import os
+from collections.abc import Callable
 from contextlib import AbstractContextManager
 from typing import Any, NamedTuple
 
@@ -21,7 +22,8 @@ from .pattern import Pattern
 
 os.environ.setdefault("MKL_CBWR", "AUTO,STRICT")  # the same bits from one run to the next, whatever the alignment
 
-__all__ = ["Factorization", "add_symmetric_product", "one_thread_of_openblas", "symmetric_product", "unsigned"]
+__all__ = ["Factorization", "add_symmetric_product", "conjugate", "one_thread_of_openblas", "symmetric_product",
+           "unsigned"]
 
 try:
     import pypardiso
@@ -135,25 +137,7 @@ class Factorization:
         `most` iterations, or where A curves down; returns the last iterate, which is a direction of descent of
         x.A x/2 - b.x in any case but zero iterations, their number, and whether the tolerance was met.
         """
-        indptr, indices, _ = unsigned(self.pattern.matrix(data))
-        x, r = np.zeros_like(b), b.copy()
-        target = tolerance * float(np.linalg.norm(b))
-        p, rz_old = np.zeros_like(b), 1.0
-        for iteration in range(most):
-            z = self.apply(r)
-            rz = float(r @ z)
-            p *= rz / rz_old
-            p += z
-            rz_old = rz
-            q = symmetric_product(indptr, indices, data, p)
-            pq = float(p @ q)
-            if not pq > 0.0:
-                return x, iteration, False
-            x += rz / pq * p
-            r -= rz / pq * q
-            if float(np.linalg.norm(r)) <= target:
-                return x, iteration + 1, True
-        return x, most, False
+        return conjugate(unsigned(self.pattern.matrix(data)), self.apply, b, tolerance, most)
 
     def release(self) -> None:
         """Free the memory of the factors."""
@@ -232,6 +216,29 @@ class _Pardiso:
             raise ConvergenceError(f"the direct solver failed: PARDISO reports error {error.value}"
                                    + (" (not enough memory)" if error.value in (-2, -9) else ""))
         return int(error.value)
+
+
+def conjugate(A: Rows, precondition: Callable[[np.ndarray], np.ndarray], b: np.ndarray, tolerance: float,
+              most: int) -> tuple[np.ndarray, int, bool]:
+    """Conjugate gradients on the upper triangle A of a matrix; see :meth:`Factorization.conjugate`."""
+    x, r = np.zeros_like(b), b.copy()
+    target = tolerance * float(np.linalg.norm(b))
+    p, rz_old = np.zeros_like(b), 1.0
+    for iteration in range(most):
+        z = precondition(r)
+        rz = float(r @ z)
+        p *= rz / rz_old
+        p += z
+        rz_old = rz
+        q = symmetric_product(A.indptr, A.indices, A.data, p)
+        pq = float(p @ q)
+        if not pq > 0.0:
+            return x, iteration, False
+        x += rz / pq * p
+        r -= rz / pq * q
+        if float(np.linalg.norm(r)) <= target:
+            return x, iteration + 1, True
+    return x, most, False
 
 
 @njit(cache=True)

@@ -14,7 +14,7 @@ import pyamg
 from scipy.sparse import bsr_array, csr_array, diags_array
 
 from ..errors import ConvergenceError, ParameterError
-from .direct import symmetric_product, unsigned
+from .direct import conjugate, unsigned
 from .pattern import Pattern
 from .space import Space
 
@@ -114,26 +114,9 @@ class Multigrid:
 
         It ends as :meth:`.Factorization.conjugate` does.
         """
-        indptr, indices, _ = unsigned(self.pattern.matrix(data))
-        x, r = np.zeros_like(b), b.copy()
-        target = tolerance * float(np.linalg.norm(b))
-        p, rz_old = np.zeros_like(b), 1.0
-        for iteration in range(most):
-            if float(np.linalg.norm(r)) <= target:
-                return x, iteration, True
-            z = self._precondition(r)
-            rz = float(r @ z)
-            p *= rz / rz_old
-            p += z
-            rz_old = rz
-            q = symmetric_product(indptr, indices, data, p)
-            pq = float(p @ q)
-            if not pq > 0.0:
-                self.definite = False
-                return x, iteration, False
-            x += rz / pq * p
-            r -= rz / pq * q
-        return x, most, float(np.linalg.norm(r)) <= target
+        x, iterations, met = conjugate(unsigned(self.pattern.matrix(data)), self._precondition, b, tolerance, most)
+        self.definite = self.definite and (met or iterations == most)
+        return x, iterations, met
 
     def apply(self, b: np.ndarray) -> np.ndarray:
         """Solution with the matrix last given, for the right-hand side b, or columns of b.
@@ -148,6 +131,8 @@ class Multigrid:
         if b.ndim == 2:
             return np.column_stack([self.apply(column) for column in b.T])
         assert self._data is not None
+        if not b.any():
+            return np.zeros_like(b)
         x, iterations, met = self.conjugate(self._data, b, self.TOLERANCE, self.MOST[self._block - 2])
         if not met:
             raise ConvergenceError(f"no solution by multigrid in {iterations} iterations: take --linear direct")
