@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import skfem
 
+from skfsink.fem.pattern import Pattern
 from skfsink.fem.space import Space
 from skfsink.fields.body import Body
 from skfsink.fields.density import DensitySolver
@@ -206,3 +207,10 @@ def close(got, expected, tolerance: float = 1e-12) -> None:
     assert got.shape == expected.shape
     error = abs(got - expected).max() / abs(expected).max()
     assert error <= tolerance, f"relative difference {error:.2e}"
+
+
+def greatest_square(momentum: Momentum, pattern: Pattern, free: np.ndarray, u: np.ndarray, mass: np.ndarray) -> float:
+    """Highest frequency squared [1/s^2] of a small body with the masses (n,) of its nodes, of the whole spectrum."""
+    root = np.sqrt(np.repeat(mass, momentum.space.dim)[free])
+    K = pattern.symmetric(momentum.tangent(pattern, u)).toarray() / root / root[:, None]
+    return float(np.linalg.eigvalsh(K)[-1])

@@ -17,6 +17,7 @@ from bodies import (
     distorted,
     ends,
     gauss_points,
+    greatest_square,
     grid,
     momentum_of,
     patchy,
@@ -24,7 +25,7 @@ from bodies import (
 )
 from scipy.optimize import brentq
 from scipy.special import i0, i1, k0, k1
-from test_pressure import INNER, OUTER, TOUGH, force, thick, tube
+from test_pressure import INNER, OUTER, TOUGH, check_work, force, thick, tube
 
 from skfsink.errors import MeshError, ParameterError
 from skfsink.fem import indicators
@@ -346,17 +347,7 @@ def test_work_is_that_of_the_forces_on_the_way(fluid: bool) -> None:
     u[space.on_axis, 0] = du[space.on_axis, 0] = 0.0
     loads = FollowerLoads(space, [(surface_of(space), Filling("all", 3.0, 0.5)) if fluid else
                                   (side_of(space), Pressure("side", 2.0))])
-    loads.at(0.4)
-    before = loads.values
-    loads.at(0.9)
-    after, total, parts = loads.values, 0.0, 400
-    for i in range(parts):
-        s = (i + 0.5) / parts
-        loads.values = before + s * (after - before)
-        total -= float(np.vdot(force(loads, u + s * du), du)) / parts
-    loads.values = after
-    assert loads.work(before, u, u + du) == pytest.approx(total, rel=1e-5)
-    assert abs(total) > 0.01
+    check_work(loads, u, du)
 
 
 def test_volumes_and_areas() -> None:
@@ -421,9 +412,7 @@ def test_highest_frequency_and_its_indicator() -> None:
         free = held(space, (np.flatnonzero(ends(space)[0]), Grip("low", (0.0, 0.0))))
         pattern = Pattern(space, 2, free, upper=True)
         mass = momentum.lumped_mass(1e-3)
-        root = np.sqrt(np.repeat(mass, 2)[free])
-        K = pattern.symmetric(momentum.tangent(pattern, u)).toarray() / root / root[:, None]
-        omega2 = np.linalg.eigvalsh(K)[-1]
+        omega2 = greatest_square(momentum, pattern, free, u, mass)
         assert highest_frequency(momentum, pattern, free, u, mass)[0] ** 2 == pytest.approx(omega2, rel=5e-3)
         inverse_mass = np.where(free.reshape(-1, 2), 1 / mass[:, None], 0.0)
         assert 0.5 * omega2 < momentum.stiffest(u, inverse_mass) < omega2

@@ -67,6 +67,21 @@ def force(loads: FollowerLoads, u: np.ndarray) -> np.ndarray:
     return out
 
 
+def check_work(loads: FollowerLoads, u: np.ndarray, du: np.ndarray) -> None:
+    """The work of loads that change, on the straight way from `u` by `du`, is the integral of their force along it."""
+    loads.at(0.4)
+    before = loads.values
+    loads.at(0.9)
+    after, total, parts = loads.values, 0.0, 400
+    for i in range(parts):
+        s = (i + 0.5) / parts
+        loads.values = before + s * (after - before)
+        total -= float(np.vdot(force(loads, u + s * du), du)) / parts
+    loads.values = after
+    assert loads.work(before, u, u + du) == pytest.approx(total, rel=1e-5)
+    assert abs(total) > 0.01
+
+
 # --- forces, stiffness and work ---
 @KINDS
 def test_nodal_forces_are_those_of_the_form(kind: str) -> None:
@@ -110,17 +125,7 @@ def test_work_is_that_of_the_forces_on_the_way(kind: str, fluid: bool) -> None:
     u, du = wavy(space, 0.1), wavy(space, 0.3, 5)
     loads = FollowerLoads(space, [(everywhere(space), Filling("all", 3.0, 0.5)) if fluid else
                                   (side(space), Pressure("side", 2.0))])
-    loads.at(0.4)
-    before = loads.values
-    loads.at(0.9)
-    after, total, parts = loads.values, 0.0, 400
-    for i in range(parts):
-        s = (i + 0.5) / parts
-        loads.values = before + s * (after - before)
-        total -= float(np.vdot(force(loads, u + s * du), du)) / parts
-    loads.values = after
-    assert loads.work(before, u, u + du) == pytest.approx(total, rel=1e-5)
-    assert abs(total) > 0.01
+    check_work(loads, u, du)
 
 
 @KINDS

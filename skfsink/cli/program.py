@@ -13,7 +13,7 @@ from cyclopts import App, ArgumentCollection, Group
 from cyclopts.exceptions import CycloptsError, UnknownCommandError
 
 from ..errors import Interrupted, SkfsinkError
-from ..methods.ranks.world import first, world
+from ..methods.ranks.world import on_all_ranks
 from ..system.version import __version__
 
 __all__ = ["command", "run"]
@@ -42,16 +42,7 @@ def run(app: App, arguments: list[str] | None, given_names: Collection[str] = ()
 
     `given_names` of options, complete when the call is made, go into the options of a case.
     """
-    try:
-        comm = world()
-    except SkfsinkError as error:
-        if first():
-            print("skfsink:", error, file=sys.stderr)
-        raise SystemExit(BAD_INPUT) from None
-    if comm is None:
-        _run(app, arguments, given_names)
-    from ..methods.ranks.crew import lead
-    lead(comm, lambda: _run(app, arguments, given_names))
+    on_all_ranks(lambda: _run(app, arguments, given_names))
 
 
 def _run(app: App, arguments: list[str] | None, given_names: Collection[str]) -> NoReturn:

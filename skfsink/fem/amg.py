@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +16,18 @@ from ..system.jit import njit
 from .direct import unsigned
 from .exchange import ALONE
 
-__all__ = ["AmgCG", "residual"]
+__all__ = ["AmgCG", "residual", "same_random_vectors"]
+
+
+@contextmanager
+def same_random_vectors() -> Iterator[None]:
+    """Within it pyamg, which estimates spectral radii from random vectors, takes the same ones every time."""
+    state = np.random.get_state()
+    np.random.seed(0)
+    try:
+        yield
+    finally:
+        np.random.set_state(state)
 
 
 class AmgCG:
@@ -44,13 +56,9 @@ class AmgCG:
         self.residual = 0.0          #: true relative residual of the last solve
         self._diagonal0 = intact.diagonal()
         self.omega = min(self.OMEGA, self.STABLE / self._radius(intact))  #: Jacobi weight
-        state = np.random.get_state()
-        np.random.seed(0)  # pyamg estimates spectral radii from random vectors
-        try:
+        with same_random_vectors():
             levels = pyamg.smoothed_aggregation_solver(
                 csr_array(intact), strength=("symmetric", {"theta": 0.0}), improve_candidates=None, max_coarse=200)
-        finally:
-            np.random.set_state(state)
         self.nodes = np.arange(intact.shape[0], dtype=np.uint32)  #: unknowns it works on
         if len(levels.levels) > 1:
             self._correct_on(csr_array(levels.levels[0].P), csr_array(levels.levels[1].A))
@@ -68,12 +76,8 @@ class AmgCG:
             self._coarse = sla.splu(csc_array(coarse), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
                                     options={"SymmetricMode": True}).solve
             return
-        state = np.random.get_state()
-        np.random.seed(0)
-        try:
+        with same_random_vectors():
             cycle = pyamg.smoothed_aggregation_solver(coarse, improve_candidates=None).aspreconditioner()
-        finally:
-            np.random.set_state(state)
         self._coarse = cycle.matvec
 
     def restricted(self, nodes: np.ndarray) -> AmgCG:

@@ -50,6 +50,9 @@ class Exchange(Protocol):
     counted: slice
     number: int
 
+    def counts(self, n: int) -> np.ndarray:
+        """Mask of the nodes that count in this part, which has n of them."""
+
     def whole(self, x: np.ndarray) -> np.ndarray:
         """Make the shares of nodal values (n,) or (n, k) whole, in place; returns `x`."""
 
@@ -110,6 +113,10 @@ class Alone:
     """A body in one piece."""
 
     counted, number = slice(None), 0
+
+    def counts(self, n: int) -> np.ndarray:
+        """All of them."""
+        return np.ones(n, bool)
 
     def whole(self, x: np.ndarray) -> np.ndarray:
         """Nothing to add."""

@@ -40,9 +40,7 @@ class JacobiCG:
                  max_iterations: int = 3000) -> None:
         self.exchange, self.tolerance, self.max_iterations = exchange, tolerance, max_iterations
         self._intact = intact
-        counted = np.zeros(intact.size, bool)
-        counted[exchange.counted] = True
-        self._counted, self.nodes = counted, np.arange(intact.size, dtype=np.uint32)
+        self._counted, self.nodes = exchange.counts(intact.size), np.arange(intact.size, dtype=np.uint32)
         self.iterations = 0          #: of the last solve
         self.residual = 0.0          #: true relative residual of the last solve
 

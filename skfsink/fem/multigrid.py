@@ -14,6 +14,7 @@ import pyamg
 from scipy.sparse import bsr_array, csr_array, diags_array
 
 from ..errors import ConvergenceError, ParameterError
+from .amg import same_random_vectors
 from .direct import conjugate, unsigned
 from .pattern import Pattern
 from .space import Space
@@ -90,14 +91,10 @@ class Multigrid:
 
     def _hierarchy(self, A: csr_array, motions: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
         """A cycle for the matrix, whose blocks are nodes, with the motions (size, 3 or 6) that it hardly resists."""
-        state = np.random.get_state()
-        np.random.seed(0)  # pyamg estimates spectral radii from random vectors
-        try:
-            A32 = csr_array((A.data, A.indices.astype(np.int32), A.indptr.astype(np.int32)), A.shape)
+        A32 = csr_array((A.data, A.indices.astype(np.int32), A.indptr.astype(np.int32)), A.shape)
+        with same_random_vectors():
             solver = pyamg.smoothed_aggregation_solver(bsr_array(A32, blocksize=(self._block,) * 2), B=motions,
                                                        improve_candidates=None, max_coarse=300)
-        finally:
-            np.random.set_state(state)
         cycle: Callable[[np.ndarray], np.ndarray] = solver.aspreconditioner().matvec
         return cycle
 

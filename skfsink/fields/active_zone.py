@@ -80,8 +80,7 @@ class ActiveZone:
         first = int(exchange.all(np.array([len(own)]))[:exchange.number].sum())
         self._centres = width * np.ascontiguousarray(cells)
         self._cell = places.ravel()[first:first + len(own)][cell.ravel()]
-        self._counted = np.zeros(len(X), bool)
-        self._counted[exchange.counted] = True
+        self._counted = exchange.counts(len(X))
         self._size = exchange.total(int(self._counted.sum()))
         self.solves = self.misses = self.choices = 0
         self.residual = 0.0
@@ -128,7 +127,7 @@ class ActiveZone:
             return min(fit, key=lambda zone: zone.size)
         depth = np.zeros_like(need)
         _deepen(self._centres, np.flatnonzero(need), need, self.MARGIN * self._l, depth)
-        if exchange.total(int(np.count_nonzero(depth[self._cell[self._counted]]))) > self.MOST * self._size:
+        if self._size_of(depth) > self.MOST * self._size:
             return None
         self.choices += 1
         return self.of_depth(depth)
@@ -136,8 +135,11 @@ class ActiveZone:
     def of_depth(self, depth: np.ndarray) -> Zone:
         """The zone with these depths of the cells [mm], as a checkpoint keeps them."""
         nodes = np.flatnonzero(depth[self._cell])
-        size = self._exchange.total(int(np.count_nonzero(self._counted[nodes])))
-        return Zone(depth, nodes, size, self._solver.restricted(nodes))
+        return Zone(depth, nodes, self._size_of(depth), self._solver.restricted(nodes))
+
+    def _size_of(self, depth: np.ndarray) -> float:
+        """Number of nodes in the whole body whose cells have a depth."""
+        return self._exchange.total(int(np.count_nonzero(depth[self._cell[self._counted]])))
 
 
 @njit(cache=True)

@@ -89,8 +89,7 @@ class DensitySolver:
 
     def __init__(self, space: Space, law: SinkLaw, sink: str = "lumped", *, tolerance: float = 1e-8,
                  unchanged: float = 1e-12, active_zone: bool = True, solver: str = "multigrid",
-                 regions: Sequence[Region] = (),
-                 kernels: str = "compiled", gradient: str = "monotone",
+                 regions: Sequence[Region] = (), kernels: str = "compiled", gradient: str = "monotone",
                  absent: np.ndarray | None = None) -> None:
         choose("sink", sink, SINKS)
         choose("gradient", gradient, GRADIENTS)
@@ -114,8 +113,7 @@ class DensitySolver:
         self._laplacian = self.backend.laplacian(self._assembled, monotone=self._bounded)
         self._laplacian[self.pattern.diagonal[self.load == 0.0]] = 1.0
         self._data, self._laplacian_diagonal = self._laplacian.copy(), self._laplacian[self.pattern.diagonal]
-        self._counted = np.zeros(space.n_nodes)
-        self._counted[space.exchange.counted] = 1.0
+        self._counted = space.exchange.counts(space.n_nodes)
         self._direct: Factorization | None = None
         self.zone: ActiveZone | None = None
         if solver == "jacobi" and self._quadrature.monotone:

@@ -72,8 +72,7 @@ class Explicit:
         self._free = np.ascontiguousarray(self.free.reshape(-1, self.space.dim))
         self._held: np.ndarray = np.logical_not(self._free.all(axis=1))
         self._exchange = self.space.exchange
-        counted = np.zeros(len(self._held), bool)
-        counted[self._exchange.counted] = True
+        counted = self._exchange.counts(len(self._held))
         self._counts = int(counted.sum())  # the first ones
         self._guided, self._guided_counted = np.flatnonzero(self._held), counted[self._held]
         if self.loading.sliding is not None:

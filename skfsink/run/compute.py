@@ -177,8 +177,7 @@ def _check(scene: Scene, job: _Job) -> None:
     if both:
         _copied(job.observers)
     check_memory(scene, job.display)
-    c = scene.controls
-    refuse_on_ranks(c.analysis, c.integrator, scene.loading(), c, scene.space.n_elements)
+    refuse_on_ranks(scene, scene.controls.analysis, scene.controls.integrator)
     if not job.resumes:
         refuse(scene)
 

@@ -25,8 +25,9 @@ from scipy.sparse import bsr_array, csr_array, diags_array
 
 from ..errors import ConvergenceError
 from ..fem import kernels
-from ..fem.amg import AmgCG
+from ..fem.amg import AmgCG, same_random_vectors
 from ..fem.direct import Factorization
+from ..fem.multigrid import rigid_motions
 from ..fem.pattern import Pattern
 from ..fem.space import Space
 from ..fields.momentum import Momentum
@@ -117,15 +118,7 @@ def tangent_system(space: Space) -> System:
     intact = stretched(1.0, -10.0)[1]
     earlier = stretched(1.05, 0.4)[1]
     u, data = stretched(1.1, 0.5)
-    modes = []
-    for i in range(dim):
-        modes.append(np.eye(dim)[i] * np.ones((len(X), 1)))
-        for j in range(i):
-            turn = np.zeros_like(X)
-            turn[:, i], turn[:, j] = X[:, j] - X[:, j].mean(), X[:, i].mean() - X[:, i]
-            modes.append(turn)
-    candidates = np.column_stack([mode.ravel()[free] for mode in modes])
-    return System(pattern, data, -momentum.force(u).ravel()[free], earlier, intact, candidates, dim)
+    return System(pattern, data, -momentum.force(u).ravel()[free], earlier, intact, rigid_motions(X)[free], dim)
 
 
 # --- the methods ---
@@ -154,9 +147,9 @@ def hierarchy(system: System, data: np.ndarray) -> sla.LinearOperator:
     A = diags_array(scale) @ A @ diags_array(scale)
     if system.block > 1:
         A = bsr_array(A, blocksize=(system.block, system.block))
-    np.random.seed(0)  # pyamg estimates spectral radii from random vectors
-    return pyamg.smoothed_aggregation_solver(A, B=system.candidates / scale[:, None], improve_candidates=None,
-                                             max_coarse=200).aspreconditioner()
+    with same_random_vectors():
+        return pyamg.smoothed_aggregation_solver(A, B=system.candidates / scale[:, None], improve_candidates=None,
+                                                 max_coarse=200).aspreconditioner()
 
 
 def amg(system: System) -> Renew:

@@ -11,9 +11,9 @@ import os
 import signal
 import sys
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from ...fields.state import State
 from ...system.peak import peak_rss_mb
 from ..explicit import Explicit
 from .mpi import MPIExchange, wait
-from .part import PartOfBody, state_of
+from .part import ELEMENTAL, NODAL, PartOfBody, state_of
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -31,7 +31,11 @@ __all__ = ["Crew", "Member", "lead"]
 
 IDLE = 1e-3    # s without a task, after which a rank looks for one less often
 UNEXPECTED = 1  # exit status of a program that ends by a mistake of its own
-TASKS = ("end", "take", "begin", "restore", "step", "gather", "deletions", "memory", "share", "sync", "peaks")
+#: what the first rank asks of all: to take something that it gives, to do something, to give something back
+GIVEN, DONE, COLLECTED = ("take", "begin", "restore"), ("step", "sync", "share"), ("new_deletions", "memory", "peak")
+TASKS = (*GIVEN, *DONE, *COLLECTED, "gather", "end")
+#: fields that can be gathered
+FIELDS = (*NODAL, *ELEMENTAL, "reaction")
 
 
 def lead(comm: MPI.Intracomm, program: Callable[[], object]) -> NoReturn:
@@ -100,7 +104,7 @@ class Member:
         if name == "reaction":
             return self.explicit.reaction[:self.part.numbers.counted]
         value: np.ndarray | None = getattr(self.state, name)
-        return value if value is None or name in ("W_max", "deleted", "sink") else value[:self.part.numbers.counted]
+        return value if value is None or name in ELEMENTAL else value[:self.part.numbers.counted]
 
     def new_deletions(self) -> list[tuple[float, int]]:
         """What has failed here since it was last asked for, by numbers in the whole body."""
@@ -112,6 +116,10 @@ class Member:
         """What the integrator remembers; vectors over free unknowns are those that count here."""
         unknowns, memory = self.body.space.exchange.over(self.body.free), self.explicit.memory()
         return {**memory, "mode": memory["mode"][unknowns.counted], "numbers": unknowns.numbers[unknowns.counted]}
+
+    def peak(self) -> float:
+        """Greatest memory that this rank has used [MB]."""
+        return peak_rss_mb()
 
 
 class Crew:
@@ -136,72 +144,67 @@ class Crew:
     def _ask(self, task: str, detail: int = 0) -> None:
         wait(self.comm.Ibcast(np.array([TASKS.index(task), detail], np.int64)))
 
+    def _give(self, task: str, items: Sequence[tuple[Any, ...]]) -> None:
+        self._ask(task)
+        getattr(self.member, task)(*self.comm.scatter(items))
+
+    def _do(self, task: str) -> Any:
+        self._ask(task)
+        return getattr(self.member, task)()
+
+    def _collect(self, task: str) -> list[Any]:
+        self._ask(task)
+        return self.comm.gather(getattr(self.member, task)()) or []
+
     def take(self, parts: list[PartOfBody]) -> None:
         """Give every rank its part."""
-        self._ask("take")
         self.numbers = [part.numbers for part in parts]
-        self.member.take(self.comm.scatter(parts))
+        self._give("take", [(part,) for part in parts])
 
     def begin(self, state: State) -> None:
         """Set the body in motion from a state of the whole."""
-        self._ask("begin")
-        self.member.begin(self.comm.scatter([state_of(state, part) for part in self.numbers]))
+        self._give("begin", [(state_of(state, part),) for part in self.numbers])
 
     def restore(self, state: State, memories: list[dict[str, np.ndarray]]) -> None:
         """Go on from a state of the whole, and what the integrator of each part remembers."""
-        self._ask("restore")
-        states = [state_of(state, part) for part in self.numbers]
-        self.member.restore(*self.comm.scatter(list(zip(states, memories))))
+        self._give("restore", [(state_of(state, part), memory) for part, memory in zip(self.numbers, memories)])
 
     def step(self) -> None:
         """One step of all."""
-        self._ask("step")
-        self.member.step()
+        self._do("step")
 
     def sync(self) -> None:
         """Bring histories up to date."""
-        self._ask("sync")
-        self.member.sync()
+        self._do("sync")
 
     def share(self) -> float:
         """The step over its stability limit."""
-        self._ask("share")
-        return self.member.share()
+        return float(self._do("share"))
+
+    def new_deletions(self) -> list[tuple[float, int]]:
+        """What has failed since it was last asked for."""
+        return sorted(entry for log in self._collect("new_deletions") for entry in log)
+
+    def memories(self) -> list[dict[str, np.ndarray]]:
+        """What the integrator of each part remembers."""
+        return self._collect("memory")
+
+    def peaks(self) -> list[float]:
+        """Greatest memory that each rank has used [MB]."""
+        return self._collect("peak")
 
     def gather(self, name: str) -> np.ndarray | None:
-        """A field of the whole body: `FIELDS` has their names."""
+        """A field of the whole body, one of :data:`FIELDS`."""
         self._ask("gather", FIELDS.index(name))
         parts = self.comm.gather(self.member.field(name))
         assert parts is not None
         if parts[0] is None:
             return None
-        elemental = name in ("W_max", "deleted", "sink")
-        places = [n.elements if elemental else n.nodes[:n.counted] for n in self.numbers]
+        places = [n.elements if name in ELEMENTAL else n.nodes[:n.counted] for n in self.numbers]
         whole: np.ndarray = np.empty((sum(place.size for place in places), *parts[0].shape[1:]), parts[0].dtype)
         for place, values in zip(places, parts):
             whole[place] = values
         return whole
-
-    def new_deletions(self) -> list[tuple[float, int]]:
-        """What has failed since it was last asked for."""
-        self._ask("deletions")
-        found = self.comm.gather(self.member.new_deletions())
-        assert found is not None
-        return sorted(entry for log in found for entry in log)
-
-    def memories(self) -> list[dict[str, np.ndarray]]:
-        """What the integrator of each part remembers."""
-        self._ask("memory")
-        found = self.comm.gather(self.member.memory())
-        assert found is not None
-        return found
-
-    def peaks(self) -> list[float]:
-        """Greatest memory that each rank has used [MB]."""
-        self._ask("peaks")
-        found = self.comm.gather(peak_rss_mb())
-        assert found is not None
-        return found
 
     def end(self) -> None:
         """Let all others go."""
@@ -216,7 +219,7 @@ class Crew:
         try:
             while (task := self._next_task())[0] != "end":
                 with suppress(SkfsinkError):  # it is that of all ranks, and the first one tells it
-                    self._do(*task)
+                    self._serve(*task)
         except BaseException as error:
             if "SKFSINK_DEBUG" in os.environ:
                 traceback.print_exc()
@@ -229,25 +232,13 @@ class Crew:
         wait(self.comm.Ibcast(task), IDLE)
         return TASKS[task[0]], int(task[1])
 
-    def _do(self, task: str, detail: int) -> None:
+    def _serve(self, task: str, detail: int) -> None:
         member, comm = self.member, self.comm
-        if task == "take":
-            member.take(comm.scatter(None))
-        elif task == "begin":
-            member.begin(comm.scatter(None))
-        elif task == "restore":
-            member.restore(*comm.scatter(None))
+        if task in GIVEN:
+            getattr(member, task)(*comm.scatter(None))
+        elif task in COLLECTED:
+            comm.gather(getattr(member, task)())
         elif task == "gather":
             comm.gather(member.field(FIELDS[detail]))
-        elif task == "deletions":
-            comm.gather(member.new_deletions())
-        elif task == "peaks":
-            comm.gather(peak_rss_mb())
-        elif task == "memory":
-            comm.gather(member.memory())
         else:
             getattr(member, task)()
-
-
-#: fields that can be gathered
-FIELDS = ("u", "v", "a", "gamma", "W_max", "deleted", "sink", "reaction")

@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ...fields.body import Body, BodyControls
+from ...fields.body import Body, BodyScene
 from ...fields.state import State
-from ...loads.schedule import Loading
 from ..controls import EventControls
 from ..integrators import INTEGRATORS, Integrator
 from .crew import Crew
@@ -41,12 +40,12 @@ def ranks_text(analysis: str, integrator: str) -> str:
     return f"{comm.size} ranks: one computes all of it, the others wait; parts know the explicit event alone"
 
 
-def refuse(analysis: str, integrator: str, loading: Loading, controls: BodyControls, elements: int) -> None:
+def refuse(scene: BodyScene, analysis: str, integrator: str) -> None:
     """Refuse an event that the ranks that there are cannot compute, before the body is loaded (ParameterError)."""
     comm = world()
     if comm is not None and analysis != "quasistatic" and integrator == "explicit":
-        check_ranks(comm.size, elements)
-        check_parts(loading, controls)
+        check_ranks(comm.size, scene.space.n_elements)
+        check_parts(scene.loading(), scene.controls)
 
 
 class InParts:
@@ -68,7 +67,7 @@ class InParts:
 
     @classmethod
     def of(cls, body: Body, controls: EventControls) -> Integrator:
-        """See :func:`integrator_of`."""
+        """That of the ranks that there are; see :func:`integrator_of`."""
         return integrator_of("explicit", body, controls)
 
     # --- what a run asks ---

@@ -70,6 +70,10 @@ class MPIExchange:
         self._unknowns: dict[int, tuple[np.ndarray, _Unknowns]] = {}
         self.halos = self.sums_made = 0
 
+    def counts(self, n: int) -> np.ndarray:
+        """Mask of the nodes that count in this part, which has n of them."""
+        return np.arange(n) < self.part.counted
+
     def whole(self, x: np.ndarray) -> np.ndarray:
         """Make the shares of nodal values (n,) or (n, k) whole, in place; returns `x`."""
         wide = x if x.ndim == 2 else x[:, None]

@@ -26,8 +26,9 @@ from .partition import Numbers, numbers, partition
 if TYPE_CHECKING:
     from mpi4py import MPI
 
-__all__ = ["PartOfBody", "check_parts", "parts_of", "state_of"]
+__all__ = ["ELEMENTAL", "NODAL", "PartOfBody", "check_parts", "parts_of", "state_of"]
 
+#: fields of a state at the nodes, and of the elements
 NODAL, ELEMENTAL = ("u", "v", "a", "gamma"), ("W_max", "deleted", "sink")
 
 

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import os
+import sys
+from collections.abc import Callable
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 from ...errors import ParameterError
 
 if TYPE_CHECKING:
     from mpi4py import MPI
 
-__all__ = ["SIZES", "world"]
+__all__ = ["SIZES", "on_all_ranks", "world"]
 
 #: variables with the number of ranks that MPICH and its kin, Open MPI, and MVAPICH set
 SIZES = ("PMI_SIZE", "OMPI_COMM_WORLD_SIZE", "MV2_COMM_WORLD_SIZE")
@@ -42,6 +44,19 @@ def world() -> MPI.Intracomm | None:
     return comm
 
 
-def first() -> bool:
-    """Whether this is the rank that speaks, also where MPI cannot be loaded."""
-    return all(os.environ.get(name, "0") == "0" for name in NUMBERS)
+def on_all_ranks(program: Callable[[], object]) -> NoReturn:
+    """Run a program, and end with it: where there are several ranks on the first, and let the others serve it.
+
+    Ranks that cannot work together end, with one line of the first of them and exit status 2.
+    """
+    try:
+        comm = world()
+    except ParameterError as error:
+        if all(os.environ.get(name, "0") == "0" for name in NUMBERS):  # there may be no MPI to ask
+            print("skfsink:", error, file=sys.stderr)
+        raise SystemExit(2) from None
+    if comm is None:
+        program()
+        raise SystemExit(0)
+    from .crew import lead
+    lead(comm, program)
