@@ -59,7 +59,7 @@ def in_unit(name: str, text: str, unit: str, plain: bool = False) -> float:
     Raises
     ------
     ParameterError
-        It is no quantity, or one of another dimension; the message names the one expected.
+        The text is not a quantity, or its unit measures something else; the message names the one expected.
     """
     wanted = f"a quantity in {unit}" if unit else "a pure number"
     typed = RAISED.sub(lambda found: f"^{found[0].translate(PLAIN)}", text[:LONGEST])

@@ -181,7 +181,7 @@ def test_body_forces_of_decks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     first, second = (Path(name, "history.csv").read_bytes() for name in ("first", "second"))
     assert first == second and StoredScene.read(Path("first")).made_in_python == ()
     for table, said in (({"y": "1 m"}, r"body force of the body, y must be a quantity in mm/s\^3"),
-                        ({"region": "core", "w": 1}, r"body_forces: 'w' is none of region, x, y, z")):
+                        ({"region": "core", "w": 1}, r"body_forces: unknown key 'w'; the keys are region, x, y, z")):
         with pytest.raises(ParameterError, match=f"^{said}"):
             read_tables("body_forces", [table])
     text = DECK.format('"-1 m/s^3"')

@@ -1,4 +1,4 @@
-"""Scenes of one's own: decks with tables, mesh files with named boundaries and regions, and the same from Python."""
+"""Scenes of your own: decks with tables, mesh files with named boundaries and regions, and the same from Python."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def test_a_deck_its_scene_file_and_python_give_the_same_run(folder: Path) -> Non
 
 
 def test_custom_plate_is_the_case_of_the_same_plate(folder: Path) -> None:
-    """Fails if a scene of one's own is computed otherwise than the same scene of a case."""
+    """Fails if a scene of your own is computed otherwise than the same scene of a case."""
     case = 'case = "single_edge_notch"\n' + HEAD.partition("\n")[2]
     assert invoke_program("run", deck(folder, HEAD + GRIPS), "--out", "own", "--quiet")[0] == 0
     assert invoke_program("run", deck(folder, case), "--out", "case", "--quiet")[0] == 0
@@ -238,7 +238,7 @@ def tomllib_text(data: dict[str, Any]) -> str:
 
 
 @pytest.mark.parametrize(("tables", "said"), [
-    ("[[grips]]\nx = 0", "grips: boundary must be a name"), ("[[grips]]\nboundary = 'top'\nw = 0", "'w' is none of"),
+    ("[[grips]]\nx = 0", "grips: boundary must be a name"), ("[[grips]]\nboundary = 'top'\nw = 0", "unknown key 'w'"),
     ("[[grips]]\nboundary = 'top'\ny = '1 mm'", "grip top, y must be a quantity in mm/s"),
     ("[[grips]]\nboundary = 'top'\ny = true", "grip top, y must be a number"),
     ("[[grips]]\nboundary = 'top'\ny = [[0, 0]]", "a ramp must have at least two points"),
@@ -250,7 +250,7 @@ def tomllib_text(data: dict[str, Any]) -> str:
     ("[[regions]]\nname = 'a'\nmaterial = 'steel'", "region a: material must be one of"),
     ("[[regions]]\nname = 'a'\nphi = '1 mm'", "region a, phi must be a quantity in MPa"),
     ("[parameters]\ngrips = []", "grips are tables beside the parameters"),
-    ("[[loads]]\n", "'loads' is none of case, parameters")])
+    ("[[loads]]\n", "unknown key 'loads'; the keys are case, parameters")])
 def test_what_are_no_tables(tables: str, said: str, tmp_path: Path) -> None:
     """Fails if a mistake in a table passes, or its line does not say where and what."""
     with pytest.raises(ParameterError) as error:
@@ -260,7 +260,7 @@ def test_what_are_no_tables(tables: str, said: str, tmp_path: Path) -> None:
 
 def test_only_custom_scenes_have_tables(tmp_path: Path) -> None:
     """Fails if the grips of a case of the paper seem to be replaced by those of a deck."""
-    with pytest.raises(ParameterError, match="'grips' is none of case, parameters"):
+    with pytest.raises(ParameterError, match="unknown key 'grips'; the keys are case, parameters"):
         read_deck(deck(tmp_path, 'case = "simple_shear"\n' + GRIPS))
 
 

@@ -110,7 +110,7 @@ def test_a_mesh_file_is_sought_from_the_folder_of_the_deck(tmp_path: Path) -> No
 
 @pytest.mark.parametrize(("text", "said"), [
     ("case = 5", "case must be a name"), ('case = "nothing"', "case must be one of"), ("", "case must be a name"),
-    ('case = "simple_shear"\nmesh = "M4"', "'mesh' is none of case, parameters"), ("case = ", "is no deck"),
+    ('case = "simple_shear"\nmesh = "M4"', "unknown key 'mesh'; the keys are case, p"), ("case = ", "is no deck"),
     ('case = "simple_shear"\n[parameters]\nsides = 5', "'sides' is no parameter"),
     ('case = "simple_shear"\n[parameters]\nout = "/etc"', "'out' is no parameter"),
     ('case = "simple_shear"\n[parameters]\nside = [5]', "side must be a number, or text with a unit such as '1.5 mm'"),

@@ -37,7 +37,7 @@ PAGES = {path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8")
 FENCE = re.compile(r"^```(\w+)\n(.*?)^```", re.DOTALL | re.MULTILINE)
 RUN = ("list", "show", "material")  # commands cheap enough to be run
 #: errors whose words stand elsewhere: their rows are found by these
-ELSEWHERE = {"… … of the onset energy at …, allowed …: …; only then raise --balance-tolerance": "energy balance error"}
+ELSEWHERE = {"… … of the onset energy at …, allowed …: …; only then raise balance_tolerance": "energy balance error"}
 
 
 def blocks(page: str, language: str) -> list[str]:

@@ -65,10 +65,10 @@ def squeezed(share: float) -> Sample:
 
 @pytest.mark.parametrize(("of", "message"), [
     (lambda: scene(), None),
-    (lambda: scene(element="plain"), r"plain element locks at k/mu = 405.* take --element jbar"),
+    (lambda: scene(element="plain"), r"plain element locks at k/mu = 405.* take element = 'jbar'"),
     (lambda: scene(material=AAA(bulk_modulus=49 * MU), element="plain"), None),
     (lambda: scene(material=AAA(bulk_modulus=1.9e4 * MU)), None),
-    (lambda: scene(material=AAA(bulk_modulus=1e5 * MU)), r"k/mu = 1e\+05 is so large .* --bulk-modulus 1.23e\+03"),
+    (lambda: scene(material=AAA(bulk_modulus=1e5 * MU)), r"k/mu = 1e\+05 is so large .* bulk_modulus 1.23e\+03"),
     (lambda: scene(block(12)), None),
     (lambda: scene(block(11)), r"no element is finer than h = 0.0909 mm, l/h = 1.10 .* refine it to h <= l/3"),
     (lambda: scene(block(16, notch=0.4, width=0.0)), r"a notch turns by 180 degrees at one node, at \(0.375, 0.5\)"),
@@ -79,7 +79,7 @@ def squeezed(share: float) -> Sample:
      r"an element near \(0.47, 0\.\d+\) mm is 0.006 mm narrow, most are 0.067 mm .*mend the mesh there"),
     (lambda: scene(squeezed(0.09), analysis="quasistatic"), None),
     (lambda: scene(squeezed(0.09), explicit=ExplicitControls(raised_mass=0.005)),
-     r"they fill 0.006 of the volume: --raised-mass 0\.00\d+\)"),
+     r"they fill 0.006 of the volume: raised_mass 0\.00\d+\)"),
 ])
 def test_scene_beyond_the_methods_is_warned_of(of: Callable[[], Scene], message: str | None,
                                                caplog: pytest.LogCaptureFixture):
@@ -207,11 +207,11 @@ def failed(count: int) -> Callable[[Watched], None]:
 
 @pytest.mark.parametrize(("change", "message"), [
     (set_ledger(numerical=-0.049), None),
-    (set_ledger(numerical=-0.051), r"energy fed in by the integrator 5.10% .* lower --courant \(now 0.8\)"),
+    (set_ledger(numerical=-0.051), r"energy fed in by the integrator 5.10% .* lower courant \(now 0.8\)"),
     (set_ledger(numerical=np.nan), r"energy fed in by the integrator nan%"),
     (set_ledger(kinetic=np.inf), r"energy fed in by the integrator"),
     (failed(20), None),
-    (failed(21), r"21 of 225 elements failed in one step at t = 0 s, allowed 20: .* lower --courant"),
+    (failed(21), r"21 of 225 elements failed in one step at t = 0 s, allowed 20: .* lower courant"),
     (mirrored(0.3), None),
     (mirrored(0.6), r"Gauss point\(s\) with a relative density of up to 0.6. are inside out .* refine the mesh there"),
 ])
@@ -229,14 +229,14 @@ def test_steps_are_watched(change: Callable[[Watched], None], message: str | Non
 
 @pytest.mark.parametrize(("change", "message"), [
     (set_ledger(elastic=1.049), None),
-    (set_ledger(elastic=1.051), r"energy balance error 5.10% .* allowed 5.00%: lower --courant .* --balance-tolerance"),
+    (set_ledger(elastic=1.051), r"energy balance error 5.10% .* allowed 5.00%: lower courant .* balance_tolerance"),
     (set_ledger(elastic=0.949), r"energy balance error"),
     (set_ledger(elastic=np.nan), r"energy balance error nan%"),
     (shares(deletion=0.049), None),
-    (shares(deletion=0.051), r"energy lost in deleted elements 5.10% .* lower --deletion .* raise --force-floor"),
-    (broken_number, r"a field is not finite at t = 0 s: lower --courant"),
+    (shares(deletion=0.051), r"energy lost in deleted elements 5.10% .* lower deletion .* raise force_floor"),
+    (broken_number, r"a field is not finite at t = 0 s: lower courant"),
     (fields(1e-15, 0.7), None),
-    (fields(1e-15, 0.9), r"less than 20% of the body is left .* dies of a bad state"),
+    (fields(1e-15, 0.9), r"less than 20% of the body is left .* all over the mesh"),
     (mirrored(0.6), r"inside out \(J <= 0\)"),
 ])
 def test_records_are_watched(change: Callable[[Watched], None], message: str | None):
@@ -257,8 +257,8 @@ def test_records_are_watched(change: Callable[[Watched], None], message: str | N
     (shares(numerical=0.049), ""),
     (shares(numerical=0.051), r"the time integration itself has dissipated 0.051"),
     (fields(-1e-7, 0.01), ""),
-    (fields(-0.04, 0.01), r"falls to -0.04: the lumped sink has no maximum principle.* --sink lumped"),
-    (mirrored(0.3), r"damaged Gauss point\(s\) are inside out .* raise --force-floor"),
+    (fields(-0.04, 0.01), r"falls to -0.04: the lumped sink has no maximum principle.* sink = 'lumped'"),
+    (mirrored(0.3), r"damaged Gauss point\(s\) are inside out .* raise force_floor"),
     (pressed, r"compressed to J = 0.12 .* refine the mesh"),
 ])
 def test_records_are_warned_of(change: Callable[[Watched], None], message: str, caplog: pytest.LogCaptureFixture):
@@ -296,9 +296,9 @@ def test_open_ledger_of_the_loading_stops_the_run():
 
 
 @pytest.mark.parametrize(("controls", "cure"), [
-    ({"explicit": ExplicitControls(courant=0.7)}, r"at t = 0 s, .*lower --courant \(now 0.7\)"),
-    ({"integrator": "hht", "hht": HHTControls(dt=3e-7)}, r"at t = 0 s, .*lower --hht-dt \(now 3e-07 s\)"),
-    ({"analysis": "quasistatic"}, r"at pass 0, .*raise --front \(now 0.95\), or compute with --analysis dynamic"),
+    ({"explicit": ExplicitControls(courant=0.7)}, r"at t = 0 s, .*lower courant \(now 0.7\)"),
+    ({"integrator": "hht", "hht": HHTControls(dt=3e-7)}, r"at t = 0 s, .*lower hht_dt \(now 3e-07 s\)"),
+    ({"analysis": "quasistatic"}, r"at pass 0, .*raise front \(now 0.95\), or compute with analysis = 'dynamic'"),
 ])
 def test_cure_is_that_of_the_method(controls: dict[str, Any], cure: str):
     """Fails if an error tells to change an option of another method."""

@@ -272,7 +272,7 @@ def test_cracks_of_a_deck(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
     ({"lips": "whole", "points": [[3, 2], [4, 2]], "width": 0}, "crack c: width must be a finite number in (0"),
     ({"lips": "whole", "points": [[3, 2], [4]]}, "crack c, points: a point must be 2 or 3 coordinates"),
     ({"lips": "whole", "points": [[3, 2]]}, "crack c, points must be 2 to 1000 points"),
-    ({"lips": "whole", "point": [[3, 2]]}, "cracks: 'point' is none of name, points, lips, width, elements")])
+    ({"lips": "whole", "point": [[3, 2]]}, "cracks: unknown key 'point'; the keys are name, points, lips")])
 def test_tables_that_are_no_cracks(tables: dict[str, Any], said: str, tmp_path: Path) -> None:
     """Fails if a table is read otherwise than it is meant."""
     write_mesh(tmp_path / "plate.vtu", plate())

@@ -227,9 +227,9 @@ def test_options_against_the_model_are_refused() -> None:
     """Fails if an option that was asked for is silently replaced by the model's."""
     model = level("single_edge_notch", "statics-half")
     assert model.apply(Options(analysis="quasistatic", phi=0.2)).half
-    with pytest.raises(ParameterError, match="--analysis both is not that of the model statics-half"):
+    with pytest.raises(ParameterError, match="analysis = both is not that of the model statics-half"):
         model.apply(Options(analysis="both"))
-    with pytest.raises(ParameterError, match="--active-zone True"):
+    with pytest.raises(ParameterError, match="active_zone = True"):
         level("single_edge_notch", "dynamics-everywhere").apply(Options(given_names=frozenset({"active_zone"})))
 
 

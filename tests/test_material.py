@@ -1,4 +1,4 @@
-"""Materials and the sink law: closed forms, derivatives, invariances, the range checks, and a law of one's own."""
+"""Materials and the sink law: closed forms, derivatives, invariances, the range checks, and a law of your own."""
 
 from __future__ import annotations
 
@@ -218,7 +218,7 @@ def test_hht_constants_of_the_paper():
     assert HHTControls().newmark_gamma == pytest.approx(0.55, rel=1e-14)
 
 
-# --- a material of one's own ---
+# --- a material of your own ---
 @njit
 def _exponential_law(i1, c, psi, dpsi, ddpsi):
     for i in range(i1.size):

@@ -313,7 +313,7 @@ def test_numbers_of_numpy_are_kept_as_plain_ones(tmp_path: Path) -> None:
 
 # --- in place of a standard one, and in one run alone ---
 class MyHistory(History):
-    """A history of one's own."""
+    """A history of your own."""
 
 
 class MyStrength(Strength):

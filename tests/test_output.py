@@ -124,7 +124,7 @@ def test_column_that_a_run_has_not(tmp_path: Path) -> None:
 
 
 def test_columns_of_other_versions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Fails if a column of one's own makes runs without it unreadable, or a run with it elsewhere."""
+    """Fails if a column of your own makes runs without it unreadable, or a run with it elsewhere."""
     history = History(tmp_path / "history.csv", rows())
     monkeypatch.setitem(HISTORY_COLUMNS, "speed_m_per_s", Column("speed of a node", "m/s", before=math.nan))
     assert np.isnan(History.load(history.path)["speed_m_per_s"]).all()  # that has the column `loads`

@@ -455,7 +455,7 @@ def test_a_resumed_run_leaves_the_same_bytes(ring: Path, text: str, integrator: 
     ('boundary = "inner"', "got neither"),
     ('boundary = "inner"\nvalue = "1 mm"', "pressure inner, value must be a quantity in MPa"),
     ('boundary = "inner"\nvalue = "1 kPa"\nin_crack = 1', "pressure inner, in_crack must be true or false"),
-    ('boundary = "inner"\nvalue = "1 kPa"\npush = 1', "pressures: 'push' is none of boundary, value, rate, in_crack"),
+    ('boundary = "inner"\nvalue = "1 kPa"\npush = 1', "pressures: unknown key 'push'; the keys are boundary"),
     ('boundary = "inside"\nvalue = "1 kPa"', "no pressure can act on boundary 'inside': no facet of the surface"),
 ])
 def test_pressures_that_are_none(ring: Path, text: str, said: str) -> None:

@@ -424,7 +424,7 @@ def test_tables_that_are_no_probes(table: dict[str, Any], said: str) -> None:
     ('[[probes]]\nkind = "point"\n', "probes: name must be a name"),
     ('[[probes]]\nname = "p"\nkind = "point"\nposition = [1]\n', "probe p, position must be 2 or 3 coordinates"),
     ('[[probes]]\nname = "p"\nkind = "point"\nposition = ["1 s", 1]\n', "probe p, position must be a quantity in mm"),
-    ('[[probes]]\nname = "p"\nkind = "point"\nat = [1, 2]\n', "probes: 'at' is none of name, kind, position,"),
+    ('[[probes]]\nname = "p"\nkind = "point"\nat = [1, 2]\n', "probes: unknown key 'at'; the keys are name, kind"),
     ('[[probes]]\nname = "p"\nkind = "reaction"\nevery = 0\n', "every of the observer probe p must be a finite number"),
     ('[[probes]]\nname = "p"\nkind = "reaction"\n' * 2, "two observers are called probe p"),
     ('[[probes]]\nname = "p"\nkind = "point"\nposition = [9, 9]\n', "probe p: (9, 9) mm is outside")])

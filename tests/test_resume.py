@@ -270,7 +270,7 @@ def test_runs_of_before_a_shared_parameter(stopped: Path, tmp_path: Path, monkey
 
 def test_a_column_of_the_history_that_is_not_known(stopped: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
                                                    ) -> None:
-    """Fails if a run with a column of one's own goes on without it, or one that is entered in one place alone runs."""
+    """Fails if a run with a column of your own goes on without it, or one that is entered in one place alone runs."""
     refused_before = "the column speed of the history is not in "
     monkeypatch.setitem(VALUES, "speed", lambda view: 1.0)
     refused(stopped, refused_before + "HISTORY_COLUMNS", "--resume", stopped / "run")

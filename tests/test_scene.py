@@ -103,7 +103,7 @@ def test_fingerprint_tells_scenes_apart(mesh: Path, tmp_path: Path) -> None:
 
 
 class Stiffer(NeoHookean):
-    """A material of one's own that its parameters do not tell from another."""
+    """A material of your own that its parameters do not tell from another."""
 
     @property
     def constants(self) -> np.ndarray:

@@ -432,7 +432,7 @@ def test_sliding_boundaries_of_decks() -> None:
                         ({"normal": "0 MPa"}, r"grip cut, normal must be a quantity in mm/s")):
         with pytest.raises(ParameterError, match=f"^{said}"):
             read_tables("grips", [{**table, **wrong}])
-    with pytest.raises(ParameterError, match=r"^tractions: 'normal' is none of boundary, x, y, z"):
+    with pytest.raises(ParameterError, match=r"^tractions: unknown key 'normal'; the keys are boundary, x, y, z"):
         read_tables("tractions", [table])
 
 

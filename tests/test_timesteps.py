@@ -114,7 +114,7 @@ def test_explicit_says_when_it_has_blown_up(fracture: Fracture):
 def test_explicit_says_where_no_step_is_short_enough(fracture: Fracture):
     """Fails if a scheme that cannot keep the energy halves its step for ever, or does not say where."""
     explicit, state = too_long(fracture, 1e-18)
-    with pytest.raises(InstabilityError, match=r"no explicit step down to .* near \(.*\) mm .* take --integrator hht$"):
+    with pytest.raises(InstabilityError, match=r"no explicit step .* near \(.*\) mm .* take integrator = 'hht'$"):
         for _ in explicit.run(state, 1.0):
             assert state.step <= 400
     assert np.isfinite(state.u).all() and np.isfinite(state.ledger.elastic)

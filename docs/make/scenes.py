@@ -24,7 +24,7 @@ lengths are not printed in the paper, and those used are listed below as assumed
 
 This page is made from the cases and their stored results (`cases/NAME/reference`) by `python docs/make/scenes.py`; the
 figures by `python figures/redraw.py`, with `--compute` after running the cases again. In the tables, $U$ is the paper's
-dissipated energy at the first arrival of the crack at a free edge and $D$ the energy the sink takes up to there
+dissipated energy at the first arrival of the crack at a free edge and $D$ the energy that the sink takes until then
 ([theory](theory.md)); load, $U$ and $D$ of plane scenes are per mm of thickness.
 """
 

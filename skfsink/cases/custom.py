@@ -1,4 +1,4 @@
-"""A scene of one's own: any mesh, held, moved and pulled at its named boundaries, of one or several materials."""
+"""A scene of your own: any mesh, held, moved and pulled at its named boundaries, of one or several materials."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def custom(
         cracks: Annotated[Sequence[Mapping[str, Any]], IN_A_DECK] = (),
         options: Options = Options(),  # noqa: B008
 ) -> Result:
-    """Load a body of one's own until it fails, and watch the crack.
+    """Load a body of your own until it fails, and watch the crack.
 
     The body is the mesh; named boundaries of it are grips, or carry tractions. Boundaries that the mesh does not name
     may be called "left", "right" (least and greatest x), "bottom", "top" (y), "back" and "front" (z). It is loaded

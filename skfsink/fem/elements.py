@@ -64,5 +64,5 @@ def check_element(name: str, space: Space, kernels: str = "compiled") -> Element
         raise ParameterError(f"element {name} is not for bodies of revolution, and the space is that of one: take "
                              f"axisymmetric")
     if kernels == "compiled" and not element.compiled:
-        raise ParameterError(f"element {name} has no compiled loops: take --kernels forms")
+        raise ParameterError(f"element {name} has no compiled loops: take kernels = 'forms'")
     return element

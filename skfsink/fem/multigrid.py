@@ -83,7 +83,7 @@ class Multigrid:
         diagonal = whole.diagonal()
         if not (diagonal > 0.0).all():
             raise ConvergenceError("the tangent of the body has an entry on its diagonal that is not above 0: take "
-                                   "--linear direct")
+                                   "linear = 'direct'")
         self._scale = 1.0 / np.sqrt(diagonal)
         scaled = csr_array(diags_array(self._scale) @ whole @ diags_array(self._scale))
         self._cycle = self._hierarchy(scaled, self._motions / self._scale[:, None])
@@ -132,7 +132,7 @@ class Multigrid:
             return np.zeros_like(b)
         x, iterations, met = self.conjugate(self._data, b, self.TOLERANCE, self.MOST[self._block - 2])
         if not met:
-            raise ConvergenceError(f"no solution by multigrid in {iterations} iterations: take --linear direct")
+            raise ConvergenceError(f"no solution by multigrid in {iterations} iterations: take linear = 'direct'")
         return x
 
     def solve_sum(self, B: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -162,7 +162,7 @@ class Gamg(Multigrid):
         try:
             from petsc4py import PETSc
         except ImportError as error:
-            raise ParameterError(f"linear petsc-gamg needs petsc4py ({error}): install it, or take --linear multigrid"
+            raise ParameterError(f"linear petsc-gamg needs petsc4py ({error}): install it, or take linear = 'multigrid'"
                                  ) from None
         self._petsc: Any = PETSc
 

@@ -104,7 +104,7 @@ class State:
         Raises
         ------
         KeyError, TypeError
-            One of them is missing, or is none of a state.
+            One of them is missing, or does not belong to a state.
         """
         log = [(float(time), int(element)) for time, element in values["deletions"]]
         state = cls(**{**arrays, **values, "deletions": log, "ledger": Ledger(**values["ledger"])})

@@ -100,7 +100,7 @@ class HolzapfelGasserOgden(GeneralMaterial):
         return np.array([self.c, self.k1, self.k2, self.kappa])
 
     def fibres(self, centres: np.ndarray) -> np.ndarray:
-        """The same two directions everywhere, (n, 2, 3); a class of one's own may make them depend on the place."""
+        """The same two directions everywhere, (n, 2, 3); a class of your own may make them depend on the place."""
         n = np.array(self.normal) / np.linalg.norm(self.normal)
         axis = np.array(self.axis) - np.dot(self.axis, n) * n
         axis /= np.linalg.norm(axis)

@@ -67,7 +67,7 @@ class HHT:
         self.space, self.free = body.space, body.free
         if not self.free.any():
             raise ParameterError("every node is held in every direction, so that nothing can move by itself: take "
-                                 "--integrator explicit, or --analysis quasistatic")
+                                 "integrator = 'explicit', or analysis = 'quasistatic'")
         self.scheme = Scheme(body, self.controls, to_onset)
         self.inertia, self.solver, self._held = self.scheme.inertia, self.scheme.solver, self.scheme.held
         self._grip_velocity, self._knot = self.loading.velocity(0.0), np.inf
@@ -153,14 +153,14 @@ class HHT:
             if trial.cracked and not (self.to_onset or self._cut):
                 self._cut = True
                 log.warning("a step of %.3g s would let a crack run through at once: steps in which elements fail are "
-                            "cut to 0.1 l/c_s = %.3g s; --hht-dt at or below it spares the attempts", dt,
+                            "cut to 0.1 l/c_s = %.3g s; hht_dt at or below it spares the attempts", dt,
                             self.scheme.failing_step)
             self.rejected += 1
             self.dt = 0.5 * dt
             if self.dt < self.controls.dt_least:
                 raise ConvergenceError(f"the implicit integration stalled at t = {state.time:.4g} s: no step down to "
-                                       f"{self.controls.dt_least:.1g} s converges; lower --hht-dt (now "
-                                       f"{self.controls.dt:g} s), or take --integrator explicit")
+                                       f"{self.controls.dt_least:.1g} s converges; lower hht_dt (now "
+                                       f"{self.controls.dt:g} s), or take integrator = 'explicit'")
         if trial.corrections <= self.controls.max_iterations // 2:
             self.dt = min(self.dt * self.GROW, self.controls.dt)
 

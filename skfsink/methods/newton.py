@@ -1,6 +1,6 @@
 """Equilibrium at fixed gamma: Newton's method with an energy line search that finds one however far away it is.
 
-Factorisations are dear and kept: they first serve as they are (modified Newton), then as preconditioner of conjugate
+Factorisations are costly and kept: they first serve as they are (modified Newton), then as preconditioner of conjugate
 gradients on the current tangent, until either is slow. Where the tangent is indefinite, as when a piece comes loose
 and turns, the step is taken with a convex one: the pressure in its geometric part is bounded where it would make a
 Gauss point unstable (see :mod:`.kernels.tangent`). That is a second derivative of the potential wherever the body is

@@ -268,7 +268,7 @@ class StaticLoading:
                         "body", over)
         elif (stretch := greatest_stretch(self.space, state.u)) > self.STRETCHED:
             self.unfailed = f"the body is stretched by more than {self.STRETCHED:g}"
-            log.warning("the body is stretched by %.3g without failing (the most is %g): loading ends; lower --phi, or "
+            log.warning("the body is stretched by %.3g without failing (the most is %g): loading ends; lower phi, or "
                         "take a material that stiffens", stretch, self.STRETCHED)
         return bool(self.unfailed)
 

@@ -98,7 +98,7 @@ class Statics(StaticLoading):
             idle = idle + 1 if postponed and change <= self.controls.gamma_tolerance else 0
             if idle > self.IDLE:
                 raise ConvergenceError(f"the last {idle} passes have changed nothing, while points past the energy "
-                                       f"limiter wait for others: lower --front (now {self.controls.front:g})")
+                                       f"limiter wait for others: lower front (now {self.controls.front:g})")
             yield state
 
     def _relax(self, state: State) -> np.ndarray:
@@ -106,11 +106,11 @@ class Statics(StaticLoading):
         try:
             return self.newton.equilibrium(state.u, most=self.SNAP)[0]
         except ConvergenceError as error:
-            cure = "take another mesh, or --analysis dynamic"
+            cure = "take another mesh, or analysis = 'dynamic'"
             dead, followers = self.momentum.dead, self.momentum.followers
             if dead is not None or followers is not None:
-                cure = (f"a body that {'pressures' if dead is None else 'tractions'} tear has none; take --analysis "
-                        f"dynamic, or move a grip instead")
+                cure = (f"a body that {'pressures' if dead is None else 'tractions'} tear has none; take "
+                        f"analysis = 'dynamic', or move a grip instead")
             raise ConvergenceError(f"pass {state.step + 1}: {error}; the history follows equilibria only: "
                                    f"{cure}") from None
 

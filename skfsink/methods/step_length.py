@@ -166,7 +166,7 @@ class StepLength:
             f"no explicit step down to {self.dt:.2g} s keeps the energy of the body to "
             f"{self.controls.energy_tolerance:g} of it, at t = {state.time:.4g} s (step {state.step}), near "
             f"{place_text(place)} mm of the undeformed body: refine the mesh "
-            f"there, raise energy_tolerance, or take --integrator hht")
+            f"there, raise energy_tolerance, or take integrator = 'hht'")
 
     @property
     def rejects(self) -> bool:

@@ -36,7 +36,7 @@ PICTURES = (
     ("animation.gif", "Animation", "Relative density γ on the deformed body, moving"),
 )
 _CARDS = ("displacement of the grips at the onset", "load at the onset", "first arrival of the crack at an edge",
-          "mean speed of the tip up to there", "U at the first arrival", "D at the first arrival")
+          "mean tip speed until the first arrival", "U at the first arrival", "D at the first arrival")
 
 
 @dataclass(frozen=True)
@@ -129,7 +129,7 @@ def _title(asked: Sequence[Run]) -> str:
 
 
 def _named(run: Run) -> str:
-    """The case, or the title of a scene of one's own."""
+    """The case, or the title of a scene of your own."""
     return str(run.parameters.get("title") or run.case.replace("_", " "))
 
 

@@ -120,7 +120,7 @@ def key_table(runs: Sequence[Run], labels: Sequence[str], waves: Sequence[tuple[
         _row("where it begins to fail", "", [_beginning(run) for run in runs]),
         row("first arrival of the crack at an edge", "µs", "event", "first_arrival_s", factor=1e6),
         row("first arrival of the crack at an edge", "pass", "event", "first_arrival_pass"),
-        _row("mean speed of the tip up to there", "m/s", mean),
+        _row("mean tip speed until the first arrival", "m/s", mean),
         _row("mean speed over c_R", "", [_share(w, v, 1) for w, v in zip(waves, mean)]),
         _row("greatest speed of the tip", "m/s", fastest),
         _row("greatest speed over c_R", "", [_share(w, v, 1) for w, v in zip(waves, fastest)]),

@@ -55,7 +55,7 @@ def read_fragments(path: Path) -> dict[str, np.ndarray]:
     Raises
     ------
     OutputError
-        The file cannot be read, or is none of fragments.
+        The file cannot be read, or is not a file of fragments.
     """
     text = finished_lines(path)
     try:

@@ -87,7 +87,7 @@ def read_probes(folder: Path) -> dict[str, ProbeTable]:
     Raises
     ------
     OutputError
-        A file cannot be read, or is none of a probe.
+        A file cannot be read, or is not a file of a probe.
     """
     return {path.stem: _read(path) for path in sorted((folder / PROBES).glob("*.csv"))}
 

@@ -44,7 +44,7 @@ def load_release(path: str | Path) -> dict[str, np.ndarray]:
     Raises
     ------
     OutputError
-        The file cannot be read, or is none of energy release rates.
+        The file cannot be read, or is not a file of energy release rates.
     """
     text = finished_lines(path, "the energy release rates ")
     try:

@@ -156,11 +156,11 @@ def check_size(space: Space, length_scale: float, *, of_metres: str = "multiply 
     l, size, h = length_scale, float(np.ptp(space.X, axis=0).max()), float(space.h.min())
     if size < LEAST_BODY[0] * l:
         raise ParameterError(f"the body is {size:.3g} mm across, {size / l:.2g} of the length l = {l:g} mm over which "
-                             f"damage spreads: coordinates are in mm, so {of_metres}, or lower --length-scale")
+                             f"damage spreads: coordinates are in mm, so {of_metres}, or lower length_scale")
     if h > LARGEST_H * l:
         raise ParameterError(f"the smallest element has h = {h:.3g} mm, {h / l:.3g} times the length l = {l:g} mm over "
                              f"which damage spreads (at most {LARGEST_H:g}): coordinates are in mm, so "
-                             f"{of_micrometres}, or raise --length-scale")
+                             f"{of_micrometres}, or raise length_scale")
 
 
 def _refuse_material(scene: Scene, part: Region) -> None:
@@ -195,15 +195,15 @@ def _refuse_events(scene: Scene, loading: Loading) -> None:
     speed, pull = fastest(scene, loading)
     if c.start != "rest" and max(speed, pull) > FAST[1]:
         raise ParameterError(f"{_loads(scene, speed, pull)}, faster than waves (c_s = {_slowest(scene):.3g} m/s), and "
-                             f"the loading to the onset is static: lower the rate, or take --start rest")
+                             f"the loading to the onset is static: lower the rate, or take start = 'rest'")
     if expected.steps > STEPS[1]:
         raise ParameterError(f"an event_time of {c.event_time:.3g} s may take {expected.steps:.2g} steps of about "
                              f"{expected.dt:.2g} s (at most {STEPS[1]:g}): lower it to a few times the time in which "
                              f"the crack crosses the body, or raise the step, as by a coarser mesh")
     if expected.frames > FRAMES[1]:
         raise ParameterError(f"a frame every {c.frame_every:.3g} s may make {expected.frames:.2g} frames in an "
-                             f"event_time of {c.event_time:.3g} s (at most {FRAMES[1]:g}): raise --frame-every, or "
-                             f"lower --event-time")
+                             f"event_time of {c.event_time:.3g} s (at most {FRAMES[1]:g}): raise frame_every, or "
+                             f"lower event_time")
 
 
 def _slowest(scene: Scene) -> float:
@@ -226,7 +226,7 @@ def warn(scene: Scene, folder: Path) -> None:
     if size < LEAST_BODY[1] * l and space.n_elements > 1:  # a single element is a material point
         log.warning("the body is %.3g mm across, %.2g times the length l = %g mm over which damage spreads (less than "
                     "%g): it fails as a whole, without a crack; check the unit of the mesh (mm), or lower "
-                    "--length-scale", size, size / l, l, LEAST_BODY[1])
+                    "length_scale", size, size / l, l, LEAST_BODY[1])
     for part in scene.parts:
         _warn_of_material(scene, part)
     loading = scene.loading()
@@ -239,8 +239,8 @@ def warn(scene: Scene, folder: Path) -> None:
     if _dynamic(scene):
         _warn_of_events(scene, loading, folder)
     elif _is_viscous(scene):
-        log.warning("viscosity has no effect in a quasi-static analysis, which has no velocities: take --analysis "
-                    "dynamic, or leave it out")
+        log.warning("viscosity has no effect in a quasi-static analysis, which has no velocities: take "
+                    "analysis = 'dynamic', or leave it out")
 
 
 def _is_viscous(scene: Scene) -> bool:
@@ -258,7 +258,7 @@ def _warn_of_material(scene: Scene, part: Region) -> None:
                     material.shear_modulus, *STRENGTH[1:3], where, np.sqrt(2 * ratio))
     if stiff < COMPRESSIBLE:
         log.warning("k/mu = %.3g is so small (below %.2g)%s that Poisson's ratio is negative; check the units of "
-                    "--bulk-modulus (MPa) and of the constants", stiff, COMPRESSIBLE, where)
+                    "bulk_modulus (MPa) and of the constants", stiff, COMPRESSIBLE, where)
     if not _dynamic(scene):
         return
     if not DENSITY[1] <= material.density <= DENSITY[2]:
@@ -274,17 +274,17 @@ def _warn_of_events(scene: Scene, loading: Loading, folder: Path) -> None:
     speed, pull = fastest(scene, loading)
     if c.start != "rest" and max(speed, pull) > FAST[0]:
         log.warning("%s, %.2g of c_s = %.3g m/s (above %g): the loading to the onset is static and leaves inertia "
-                    "out; take --start rest, or lower the rate", _loads(scene, speed, pull), max(speed, pull),
+                    "out; take start = 'rest', or lower the rate", _loads(scene, speed, pull), max(speed, pull),
                     _slowest(scene), FAST[0])
     if expected.steps > STEPS[0] or expected.days > DAYS:
         log.warning("the event may take %.2g steps of about %.2g s, %.2g days of computing, if it lasts for the whole "
-                    "event_time of %.3g s: lower --event-time", expected.steps, expected.dt, expected.days,
+                    "event_time of %.3g s: lower event_time", expected.steps, expected.dt, expected.days,
                     c.event_time)
     there = float(shutil.disk_usage(next(p for p in _above(folder) if p.exists())).free)
     if expected.frames > FRAMES[0] or expected.rows > ROWS or expected.bytes > there:
         log.warning("the event may leave %.2g frames and %.2g rows of the history, about %.2g GB (there are %.2g GB), "
-                    "if it lasts for the whole event_time of %.3g s: lower --event-time, or raise --frame-every and "
-                    "--record-every", expected.frames, expected.rows, expected.bytes / 1e9, there / 1e9, c.event_time)
+                    "if it lasts for the whole event_time of %.3g s: lower event_time, or raise frame_every and "
+                    "record_every", expected.frames, expected.rows, expected.bytes / 1e9, there / 1e9, c.event_time)
 
 
 def _above(folder: Path) -> Iterator[Path]:

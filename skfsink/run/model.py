@@ -78,7 +78,7 @@ class Level:
         for name, value in values.items():
             asked = getattr(options, name)
             if asked != value and (name in options.given_names or asked != getattr(defaults, name)):
-                raise ParameterError(f"--{name.replace('_', '-')} {asked} is not that of the model {self.name} "
+                raise ParameterError(f"{name} = {asked} is not that of the model {self.name} "
                                      f"({value}); give the one or the other")
         return replace(options, **values, model=self.name)
 

@@ -21,7 +21,7 @@ def measured(scene: Scene, simulation: Simulation) -> dict[str, float | None]:
     """Figures of a run for the whole sample, whatever part of it was computed; None where its model gives none.
 
     onset_load [N; N/mm of a plate], onset_displacement of the grips [mm], U and D at the first arrival [N mm; N mm/mm],
-    arrival_time from the first cracked node to the first arrival [s], tip_speed up to there [m/s].
+    arrival_time from the first cracked node to the first arrival [s], tip_speed until then [m/s].
     """
     whole, onset = scene.whole, simulation.onset.figures
     arrival, tracker = simulation.crack.at_arrival, simulation.crack.tracker

@@ -86,7 +86,7 @@ def first_pass(scene: Scene, folder: Path, display: Display) -> tuple[np.ndarray
     state = simulation.run()
     if not state.deleted.any():
         raise MeshError("the first pass found no crack, so there is no path to lay a corridor along: raise "
-                        "--event-time, or take --mesh-layout corridor")
+                        "event_time, or take mesh_layout = 'corridor'")
     wall = simulation.cost()["wall"]
     return (scene.flat(space.X[space.conn[state.deleted]].mean(axis=1)),
             {"elements": space.n_elements, "wall_s": wall["loading"] + wall["event"]})
@@ -139,6 +139,6 @@ def corridor_report(simulation: Simulation, folder: Path) -> dict[str, Any]:
     if outside:
         with simulation.notes:
             log.warning("the crack has left the corridor of the first pass: %d of %d elements failed outside of it, "
-                        "where elements are larger; take --mesh-layout corridor", outside, len(middle))
+                        "where elements are larger; take mesh_layout = 'corridor'", outside, len(middle))
     return {"width_mm": corridor.width, "failed": len(middle), "failed_outside": outside,
             "first_pass": {"elements": elements, **cost}}

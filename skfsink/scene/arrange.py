@@ -126,7 +126,7 @@ def _slab_depth(case: str, mesh: str, dimensions: int) -> float:
     """Thickness of a plate as a slab [mm], the size of its fine elements (ParameterError: it is no plate)."""
     if dimensions == 2:
         raise ParameterError(f"dimensions must be 3 for {case}; got 2" + (
-            " (its section alone is --element planestress)" if case == "dog_bone" else ""))
+            " (its section alone is element = 'planestress')" if case == "dog_bone" else ""))
     depth: float = SHAPES[case].meshes[mesh]["h"] if mesh in SHAPES[case].meshes else 1.0
     return depth
 
@@ -139,7 +139,7 @@ def _sample(case: str, arguments: Mapping[str, Any], options: Options, from_sect
     if options.mesh_layout == "two-pass" and options.corridor is not None:
         path = options.corridor
         if not path.is_file():
-            raise MeshError(f"there is no mesh of a corridor {path}; a run with --mesh-layout two-pass leaves it")
+            raise MeshError(f"there is no mesh of a corridor {path}; a run with mesh_layout = 'two-pass' leaves it")
         return load_sample(case, name, lambda: read_mesh(path), from_section)
     settings = laid_out(case, name, options)
     if settings.get("symmetry") == "mirror" and f"{name}-mirror" in shape.meshes:

@@ -44,7 +44,7 @@ class Controls:
     checkpoint_every: wall time between checkpoints [s], > 0.
     threads: that share factorisations and loops over elements, >= 0; 0 takes one for a plane body and else
         OMP_NUM_THREADS or the machine's cores, at most 4. Runs with the same number agree to the last bit.
-    start: of a dynamic analysis, "onset" (statics up to there) or "rest" (see :mod:`.rest`).
+    start: of a dynamic analysis, "onset" (statics until then) or "rest" (see :mod:`.rest`).
     density_solver: "multigrid" or "jacobi"; see :data:`.SOLVERS`. Several ranks take "jacobi" in the event.
     active_zone: explicit steps solve for gamma only where it changes (see :mod:`.active_zone`).
     contact: the lips of cracks bear on each other (see :mod:`.contact`), in events and quasi-static passes.

@@ -39,7 +39,7 @@ LARGEST = 1_000_000  # bytes
 
 @dataclass(frozen=True)
 class Deck:
-    """A scene as it was asked for: a case, and the parameters that are not to have their defaults."""
+    """A scene as it was asked for: a case, and the parameters that differ from their defaults."""
 
     case: str
     parameters: Mapping[str, Any]
@@ -114,7 +114,8 @@ def _deck(data: Mapping[str, Any]) -> Deck:
     case = find_case(name) if isinstance(name, str) and name in CASES else None
     top = (*TOP, *(case.tables if case else ()))
     if unknown := [key for key in data if key not in top]:
-        raise ParameterError(f"{unknown[0]!r} is none of {', '.join(top)}")
+        beneath = "; it belongs under [parameters]" if case and unknown[0] in case.parameters else ""
+        raise ParameterError(f"unknown key {unknown[0]!r}; the keys are {', '.join(top)}{beneath}")
     if not isinstance(name, str) or not isinstance(parameters, dict):
         raise ParameterError(f"case must be a name, one of {', '.join(CASES)}, and parameters a table")
     case = case or find_case(name)  # which says what there is

@@ -76,7 +76,7 @@ class Options:
         What "auto" is to get right: "onset_load", "onset_displacement", "U", "D", "arrival_time", "tip_speed" or
         "crack_path".
     start
-        Of a dynamic analysis: "onset" (statics up to there) or "rest" (dynamics from the unloaded body on).
+        Of a dynamic analysis: "onset" (statics until then) or "rest" (dynamics from the unloaded body on).
     half
         Compute the half (dog-bone: quarter) that mirror symmetry leaves.
     dimensions

@@ -45,7 +45,7 @@ def _message(kind: str, mistake: Mistake, table: Any) -> str:
     if not mistake.field:
         return f"{kind} must be tables; got {table!r:.80}"
     if mistake.unknown:
-        return f"{kind}: {mistake.field!r} is none of {', '.join(TYPES[kind])}"
+        return f"{kind}: unknown key {mistake.field!r}; the keys are {', '.join(TYPES[kind])}"
     if mistake.field == key:
         return f"{kind}: {key} must be a name; got {mistake.value!r:.80}"
     return f"{SINGULAR.get(kind, kind.removesuffix('s'))} {table.get(key, 'of the body')}, {mistake.text}"

@@ -114,13 +114,13 @@ class Guard(Observer):
     def _step_cure(self) -> str:
         c = self.scene.controls
         if c.analysis == "quasistatic":
-            return f"raise --front (now {c.statics.front:g}), or compute with --analysis dynamic"
+            return f"raise front (now {c.statics.front:g}), or compute with analysis = 'dynamic'"
         if c.integrator == "explicit":
             if (share := self._share_of_limit()) <= 1.0:
                 return (f"a shorter step is no cure, since this one is {share:.2f} of its stability limit: refine the "
-                        f"mesh there, or take --integrator hht")
-            return f"lower --courant (now {c.explicit.courant:g})"
-        return f"lower --hht-dt (now {c.hht.dt:g} s)"
+                        f"mesh there, or take integrator = 'hht'")
+            return f"lower courant (now {c.explicit.courant:g})"
+        return f"lower hht_dt (now {c.hht.dt:g} s)"
 
     def _share_of_limit(self) -> float:
         """The explicit step over its stability limit; infinite where that cannot be told any more."""
@@ -150,7 +150,7 @@ class Guard(Observer):
         if not error <= allowed:
             raise InstabilityError(f"the ledger of the loading is open by {error:.2%} of the stored energy, allowed "
                                    f"{allowed:.2%}: the body snaps or buckles on its way; hold it sideways, or raise "
-                                   f"--balance-tolerance")
+                                   f"balance_tolerance")
         self._check_shape(state)
 
     def _loaded(self, state: State) -> np.ndarray:
@@ -190,7 +190,7 @@ class Guard(Observer):
         if not (energy_fed_in <= allowed and np.isfinite(ledger.elastic + ledger.kinetic)):
             raise InstabilityError(f"energy fed in by the integrator {energy_fed_in:.2%} of the onset energy at "
                                    f"{self._when(state)}, allowed {allowed:.2%}: {self._step_cure}; only then raise "
-                                   f"--balance-tolerance")
+                                   f"balance_tolerance")
         before, self._deleted = self._deleted, len(state.deletions)
         failed, share = self._deleted - before, self.SUDDEN[0] * self.space.n_elements
         if before >= 0 and failed > max(share, self.SUDDEN[1]) and not self._has_dissolved():
@@ -216,7 +216,7 @@ class Guard(Observer):
         if not worst <= allowed:
             cure = self._deletion_cure if "deleted" in name else self._step_cure
             raise InstabilityError(f"{name} {worst:.2%} of the onset energy at {self._when(state)}, allowed "
-                                   f"{allowed:.2%}: {cure}; only then raise --balance-tolerance")
+                                   f"{allowed:.2%}: {cure}; only then raise balance_tolerance")
         if not (np.isfinite(state.u).all() and np.isfinite(state.v).all() and np.isfinite(state.gamma).all()):
             raise InstabilityError(f"a field is not finite at {self._when(state)}: {self._step_cure}")
         if lost > self.CARRIED:
@@ -225,11 +225,11 @@ class Guard(Observer):
         if ledger.numerical > allowed * scale:
             log.warning("the time integration itself has dissipated %.2g of the onset energy (above %g): %s%s",
                         ledger.numerical / scale, allowed, self._step_cure,
-                        ", or an --hht-alpha nearer to 0" if self.scene.controls.integrator == "hht" else "")
+                        ", or an hht_alpha nearer to 0" if self.scene.controls.integrator == "hht" else "")
         least = float(state.gamma.min())
         if least < self.NEGATIVE:
             log.warning("the relative density falls to %.2g: the %s sink has no maximum principle; such points are "
-                        "taken as dead. --sink lumped keeps it in (0, 1]", least, self.scene.controls.sink)
+                        "taken as dead. sink = 'lumped' keeps it in (0, 1]", least, self.scene.controls.sink)
         if indicators.mean_density(space, state.gamma) < self.DEAD and not self._has_dissolved():
             raise InstabilityError(f"less than {self.DEAD:.0%} of the body is left at {self._when(state)}: this is no "
                                    f"crack but a mesh that dies of a bad state; {self._step_cure}")
@@ -255,7 +255,7 @@ class Guard(Observer):
         if count:
             self._inside_out = True
             log.warning("%d damaged Gauss point(s) are inside out (J <= 0), with a relative density of up to %.2g: "
-                        "their force means nothing; raise --force-floor, or refine the mesh there", count, gamma)
+                        "their force means nothing; raise force_floor, or refine the mesh there", count, gamma)
         else:
             log.warning("a live Gauss point is compressed to J = %.2g (below %g): elements soon turn inside out there; "
                         "refine the mesh where it is pressed", least, self.FLAT)
@@ -278,7 +278,7 @@ class Guard(Observer):
             first = self.space.conn[int(np.argmax(crushed))]
             log.warning("the stress of %d element(s) is not known at %s, as of one near %s mm: a point that exerts a "
                         "force is crushed or inside out there; frames have NaN for it, and 1 in the field crushed; "
-                        "refine the mesh where it is pressed, or raise --force-floor", crushed.sum(), self._when(state),
+                        "refine the mesh where it is pressed, or raise force_floor", crushed.sum(), self._when(state),
                         place_text(self.space.X[first].mean(axis=0)))
 
     def check_end(self) -> None:
@@ -291,13 +291,13 @@ class Guard(Observer):
     def _overlap_cure(self) -> str:
         if self.scene.controls.contact:
             return "contact acts between the lips of cracks alone; give a notch more width, or refine where lips meet"
-        return ("there is no contact; take --contact for the lips of cracks, end the loading before faces of a notch "
-                "meet, or give it more width")
+        return ("there is no contact; take contact = true for the lips of cracks, end the loading before faces of a "
+                "notch meet, or give it more width")
 
     @property
     def _deletion_cure(self) -> str:
         c = self.scene.controls
-        return f"lower --deletion (now {c.deletion:g}) or raise --force-floor (now {c.force_floor:g}) above it"
+        return f"lower deletion (now {c.deletion:g}) or raise force_floor (now {c.force_floor:g}) above it"
 
     def _when(self, state: State) -> str:
         if self.scene.controls.analysis == "quasistatic" and state.phase == "event":

@@ -37,15 +37,15 @@ def check_scene(scene: Scene) -> None:
     ratio = part.material.bulk_modulus / part.material.shear_modulus
     if scene.controls.element == "plain" and ratio > LOCKS:
         log.warning("the plain element locks at k/mu = %.4g (above %g)%s: stiffness, onset load and U come out too "
-                    "high; take --element jbar", ratio, LOCKS, _where(scene, part))
+                    "high; take element = 'jbar'", ratio, LOCKS, _where(scene, part))
     if ratio > STIFF and scene.controls.element != "planestress":
         log.warning("k/mu = %.3g%s is so large (above %g) that rounding comes near the tolerance of equilibria, "
-                    "and the explicit step falls with its root; with --bulk-modulus %.3g the solid is as good as "
+                    "and the explicit step falls with its root; with bulk_modulus %.3g the solid is as good as "
                     "incompressible", ratio, _where(scene, part), STIFF, 1e3 * part.material.shear_modulus)
     h = float(space.h.min())
     if h > l / COARSE:
         log.warning("no element is finer than h = %.3g mm, l/h = %.2f (less than %g): onset and U are those of the "
-                    "mesh; refine it to h <= l/3, or raise --length-scale", h, l / h, COARSE)
+                    "mesh; refine it to h <= l/3, or raise length_scale", h, l / h, COARSE)
     angle, place = indicators.turning(space)
     if angle > SHARP:
         log.warning("a notch turns by %.0f degrees at one node, at %s mm (above %g): it is as sharp as elements "
@@ -64,7 +64,7 @@ def _check_widths(space: Space, raised: float) -> None:
     if share > raised:
         log.warning("an element near %s mm is %.2g mm narrow, most are %.2g mm (a share less than %g): it makes "
                     "the explicit step that much shorter for all; mend the mesh there, raise the mass of such elements "
-                    "(they fill %.1g of the volume: --raised-mass %.2g), or take --integrator hht",
+                    "(they fill %.1g of the volume: raised_mass %.2g), or take integrator = 'hht'",
                     place_text(space.X[space.conn[e]].mean(axis=0)), widths[e], typical, NARROW, share, 1.1 * share)
 
 
@@ -75,7 +75,7 @@ def check_onset(scene: Scene, state: State) -> None:
     h = indicators.size_near(space, weakest, l)
     if h > l / COARSE:
         log.warning("where it begins to fail, at %s mm, elements have h = %.3g mm, l/h = %.2f (less than %g): "
-                    "onset and U are those of the mesh; refine it there to h <= l/3, or raise --length-scale",
+                    "onset and U are those of the mesh; refine it there to h <= l/3, or raise length_scale",
                     place_text(space.X[weakest]), h, l / h, COARSE)
     check_pressure(scene, state)
 
@@ -92,7 +92,7 @@ def check_pressure(scene: Scene, state: State) -> None:
         amplitude = indicators.alternation(space, indicators.element_pressure(space, state.u, k), there)
         if amplitude > CHECKERED * part.material.shear_modulus:
             log.warning("pressures of neighbouring elements alternate by %.3g MPa (above %g mu)%s: a checkerboard, "
-                        "with %.2g of the energy limiter; break up the rows of the mesh, or lower --bulk-modulus",
+                        "with %.2g of the energy limiter; break up the rows of the mesh, or lower bulk_modulus",
                         amplitude, CHECKERED, _where(scene, part), amplitude**2 / (2 * k) / part.sink_law.phi)
 
 
