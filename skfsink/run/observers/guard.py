@@ -195,8 +195,8 @@ class Guard(Observer):
         failed, share = self._deleted - before, self.SUDDEN[0] * self.space.n_elements
         if before >= 0 and failed > max(share, self.SUDDEN[1]) and not self._has_dissolved():
             raise InstabilityError(f"{failed} of {self.space.n_elements} elements failed in one step at "
-                                   f"{self._when(state)}, allowed {max(int(share), self.SUDDEN[1])}: this is no crack "
-                                   f"but a mesh that dies of a bad state; {self._step_cure}")
+                                   f"{self._when(state)}, allowed {max(int(share), self.SUDDEN[1])}: elements fail all "
+                                   f"over the mesh, not along a crack; {self._step_cure}")
         if self.momentum.least_J <= 0.0 and not self._inside_out:
             self._check_shape(state)
 
@@ -231,8 +231,8 @@ class Guard(Observer):
             log.warning("the relative density falls to %.2g: the %s sink has no maximum principle; such points are "
                         "taken as dead. sink = 'lumped' keeps it in (0, 1]", least, self.scene.controls.sink)
         if indicators.mean_density(space, state.gamma) < self.DEAD and not self._has_dissolved():
-            raise InstabilityError(f"less than {self.DEAD:.0%} of the body is left at {self._when(state)}: this is no "
-                                   f"crack but a mesh that dies of a bad state; {self._step_cure}")
+            raise InstabilityError(f"less than {self.DEAD:.0%} of the body is left at {self._when(state)}: "
+                                   f"elements fail all over the mesh, not along a crack; {self._step_cure}")
         h = space.h[state.deleted]
         coarse = h > l / COARSE
         if coarse.sum() > max(2, 0.2 * h.size):
