@@ -1,4 +1,4 @@
-"""What a release consists of: one version everywhere, the recipe for conda, the software paper, the page of moved names."""
+"""What a release consists of: one version everywhere, a recipe for conda, a software paper, a page of moved names."""
 
 from __future__ import annotations
 
@@ -44,11 +44,13 @@ def test_recipe_is_one() -> None:
 def test_requirements_of_the_recipe_are_those_of_the_project() -> None:
     """Fails if a requirement, or its least version, is changed in one place alone."""
     def parted(text: str) -> tuple[str, str]:
-        name, bound = re.fullmatch(r"([\w.-]+?)\s*((?:[<>=!~].*)?)", text.partition(";")[0].strip()).groups()  # type: ignore[union-attr]
-        return CONDA.get(name, name), bound
+        found = re.fullmatch(r"([\w.-]+?)\s*((?:[<>=!~].*)?)", text.partition(";")[0].strip())
+        assert found
+        return CONDA.get(found[1], found[1]), found[2]
 
     wanted = {parted(text) for text in (*PROJECT["dependencies"], f"python{PROJECT['requires-python']}")}
-    assert {parted(text) for text in recipe()["requirements"]["run"]} == {pair for pair in wanted if pair[0] not in LIMITED}
+    found = {parted(text) for text in recipe()["requirements"]["run"]}
+    assert found == {pair for pair in wanted if pair[0] not in LIMITED}
     assert {parted(text)[0] for text in recipe()["requirements"]["run_constrained"]} == LIMITED
     (name, target), = PROJECT["scripts"].items()
     assert recipe()["build"]["entry_points"] == [f"{name} = {target}"]
@@ -57,7 +59,7 @@ def test_requirements_of_the_recipe_are_those_of_the_project() -> None:
 def test_the_paper_cites_what_it_lists_and_shows_what_there_is() -> None:
     """Fails if a reference or a figure of the software paper is missing, or listed for nothing."""
     text = (ROOT / "paper" / "paper.md").read_text(encoding="utf-8")
-    listed = set(re.findall(r"^@\w+\{([^,]+),", (ROOT / "paper" / "paper.bib").read_text(encoding="utf-8"), re.MULTILINE))
+    listed = set(re.findall(r"^@\w+\{([^,]+),", (ROOT / "paper" / "paper.bib").read_text(encoding="utf-8"), re.M))
     assert set(re.findall(r"\[@([\w-]+)\]", text)) == listed
     figures = re.findall(r"!\[[^\]]*\]\(([^)]+)\)", text)
     assert figures and all((ROOT / "paper" / name).is_file() for name in figures)
@@ -69,3 +71,9 @@ def test_every_old_module_is_on_the_page() -> None:
     """Fails if the page of moved names leaves one out, or has one that does not exist."""
     text = (ROOT / "docs" / "migrating.md").read_text(encoding="utf-8")
     assert dict(re.findall(r"\| `skfsink\.([\w.]+)` \| `skfsink\.([\w.]+)` \|", text)) == OLD
+
+
+def test_the_slim_environment_leaves_out_mkl_alone() -> None:
+    """Fails if what is installed without MKL is not what the project needs else."""
+    lines = [line for line in (ROOT / "recipe" / "slim.txt").read_text(encoding="utf-8").splitlines() if line[0] != "#"]
+    assert lines == [text for text in PROJECT["dependencies"] if re.split(r"\W", text)[0] not in LIMITED]
