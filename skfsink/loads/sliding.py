@@ -192,7 +192,7 @@ class SlidingPlanes:
                 if pattern.upper:
                     p, q = np.minimum(p, q), np.maximum(p, q)
                 to.append(there)
-                of.append(np.asarray(numbers[p, q]).ravel() - 1)
+                of.append(np.asarray(numbers[p, q]).ravel() - 1 if p.size else p)  # a sparse array is what is empty
                 weights.append(weight[there])
         turn = csr_array((np.concatenate(weights), (np.concatenate(to), np.concatenate(of))),
                          shape=(entries.size, pattern.nnz))
