@@ -162,6 +162,26 @@ def test_runs_on_several_ranks_are_those_on_one(mesh: Path, tmp_path: Path) -> N
 
 @ranks
 @pytest.mark.slow
+def test_loads_of_all_kinds_on_several_ranks(tmp_path: Path) -> None:
+    """Fails if a load is not that of the whole body on any number of ranks, its ledger opens, or a run that was stopped
+    on two ranks does not go on on three as it would have on one."""
+    script = HERE / "loads_on_ranks.py"
+    finished([sys.executable, str(script), str(tmp_path / "one")])
+    for count, name, how in ((2, "two", []), (3, "three", []), (2, "stopped", ["stop"]), (3, "stopped", ["resume"])):
+        finished(on(count, "-m", "skfsink.methods.ranks", script, tmp_path / name, *how))
+    for kind in ("dead", "pressure", "filling", "oblique", "turn"):
+        one = _rows(tmp_path / "one" / kind)
+        assert int(one[-1]["deleted_elements"]) > 0
+        for name in ("two", "three", "stopped"):
+            rows = _rows(tmp_path / name / kind)
+            _check_same(rows, one)
+            balance = next(column for column in rows[0] if column.startswith("balance"))
+            scale = max(float(row[f"elastic{balance[7:]}"]) for row in rows)
+            assert max(abs(float(row[balance])) for row in rows if row["phase"] == "event") < 1e-9 * scale
+
+
+@ranks
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_a_lost_rank_ends_all_and_the_run_goes_on(count: int, mesh: Path, tmp_path: Path) -> None:
     """Fails if a run waits for a rank that is gone, or its checkpoint is of that number of ranks alone."""
