@@ -1,4 +1,4 @@
-"""Events under loads of all kinds, on the ranks that there are: `python tests/loads_on_ranks.py FOLDER [stop | resume]`.
+"""Events under loads of all kinds, on the ranks there are: `python tests/loads_on_ranks.py FOLDER [stop | resume]`.
 
 On several: `mpiexec -n 2 python -m skfsink.methods.ranks tests/loads_on_ranks.py FOLDER`. Each kind runs in a folder of
 its own; with `stop` it is stopped after some steps of the event, and with `resume` it goes on from there.
@@ -29,8 +29,8 @@ from skfsink.run.simulate import Simulation
 from skfsink.scene.controls import Controls
 from skfsink.scene.scene import Scene
 
-CONTROLS: dict[str, Any] = {"density_solver": "jacobi", "event_time": 1.2e-5, "overshoot": 0.01, "checkpoint_every": 1e6,
-                            "frame_every": 1e-3}
+CONTROLS: dict[str, Any] = {"density_solver": "jacobi", "event_time": 1.2e-5, "overshoot": 0.01,
+                            "checkpoint_every": 1e6, "frame_every": 1e-3}
 BURST = {**CONTROLS, "event_time": 6e-5, "record_every": 2e-6}
 STEPS = 150    # after which an event is stopped
 

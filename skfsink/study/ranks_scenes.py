@@ -1,7 +1,7 @@
 """The scenes on two ranks against one: `python -m skfsink.study.ranks --only scenes`.
 
-Each coarse scene is computed on one rank and on two, in both analyses, with the same solver of the density, and its
-event once more on two. Differences are those of rounding, which a crack that branches amplifies.
+Each coarse scene, and the pressurised aneurysm, is computed on one rank and on two, with the same solver of the
+density, and its event once more on two. Differences are those of rounding, which a crack that branches amplifies.
 """
 
 from __future__ import annotations
@@ -10,9 +10,10 @@ import os
 import shutil
 import subprocess
 import sys
-import tempfile
 from dataclasses import dataclass
 from pathlib import Path
+from shutil import copytree
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,8 @@ import numpy as np
 from ..errors import ParameterError, SkfsinkError
 from ..results.history import Table
 from ..results.loader import Run, load
+from ..system.files import write_atomic
+from ..system.shipped import deck_path
 from .chart import page
 from .part import Part, Planned, Points
 
@@ -28,6 +31,8 @@ __all__ = ["SCENES", "on_ranks"]
 #: names, and about how long they take [s]
 NAMES = {"dog_bone": 130, "single_edge_notch": 110, "symmetric_double_edge_notch": 120,
          "asymmetric_double_edge_notch": 240, "cylindrical_shell": 700, "simple_shear": 600}
+#: decks of the aneurysm, under a pressure and filled by a fluid
+DECKS = {"aneurysm": "scene.toml", "aneurysm_filled": "fluid.toml"}
 SHOWN = 80     # points of a curve
 
 
@@ -61,25 +66,54 @@ def on_ranks(count: int, words: list[str]) -> str:
     return done.stdout
 
 
+def _words(name: str, analysis: str, folder: Path) -> list[str]:
+    """Arguments of Python for a run of a scene or a deck with conjugate gradients, but for where its files go."""
+    if name in DECKS:
+        path = deck_path(Path("aneurysm"))
+        copytree(path.parent / "meshes", folder / "meshes", dirs_exist_ok=True)
+        text = path.with_name(DECKS[name]).read_text(encoding="utf-8")
+        write_atomic(folder / "scene.toml", text.replace("[parameters]", '[parameters]\ndensity_solver = "jacobi"', 1))
+        return ["-m", "skfsink", "run", str(folder / "scene.toml"), "--quiet"]
+    return ["-m", f"skfsink.cases.{name}", "--mesh", "coarse", "--analysis", analysis, "--density-solver", "jacobi",
+            "--quiet"]
+
+
 @dataclass(frozen=True)
-class _Scene:
-    """Computes a point: a scene on one rank and on two."""
+class _Event:
+    """Computes a point: an event on one rank and twice on two."""
 
     name: str
 
     def __call__(self) -> dict[str, Any]:
-        with tempfile.TemporaryDirectory() as folder:
+        with TemporaryDirectory() as folder:
             out = {key: Path(folder) / key for key in ("one", "two", "again")}
-            for key, count, analysis in (("one", 1, "both"), ("two", 2, "both"), ("again", 2, "dynamic")):
-                on_ranks(count, ["-m", f"skfsink.cases.{self.name}", "--mesh", "coarse", "--analysis", analysis,
-                                 "--density-solver", "jacobi", "--quiet", "--out", str(out[key])])
-            one, two = load(out["one"] / "dynamic"), load(out["two"] / "dynamic")
-            same = all((out["two"] / "dynamic" / name).read_bytes() == (out["again"] / name).read_bytes()
-                       for name in ("history.csv", "deletions.csv"))
-            passes = all((out["one"] / "quasistatic" / name).read_bytes() == (out["two"] / "quasistatic" / name)
-                         .read_bytes() for name in ("history.csv", "deletions.csv"))
-            return {"elements": one.summary["elements"], "bytes_again": same, "bytes_of_passes": passes,
+            words = _words(self.name, "dynamic", Path(folder))
+            for key, count in (("one", 1), ("two", 2), ("again", 2)):
+                on_ranks(count, [*words, "--out", str(out[key])])
+            one, two = load(out["one"]), load(out["two"])
+            return {"elements": one.summary["elements"], "again": _same_bytes(out["two"], out["again"]),
                     **compared(one, two)}
+
+
+@dataclass(frozen=True)
+class _Passes:
+    """Computes a point: the quasi-static analysis on one rank and on two, of which the first computes it."""
+
+    name: str
+
+    def __call__(self) -> dict[str, Any]:
+        with TemporaryDirectory() as folder:
+            out = {count: Path(folder) / str(count) for count in (1, 2)}
+            for count, path in out.items():
+                on_ranks(count, [*_words(self.name, "quasistatic", Path(folder)), "--out", str(path)])
+            summary = load(out[2]).summary
+            return {"same": _same_bytes(out[1], out[2]), "passes": summary["cost"]["steps"],
+                    "balance": summary["energy"]["balance_error_relative"]}
+
+
+def _same_bytes(one: Path, other: Path) -> bool:
+    """Whether histories and failed elements of two runs are the same to the last bit."""
+    return all((one / name).read_bytes() == (other / name).read_bytes() for name in ("history.csv", "deletions.csv"))
 
 
 def compared(one: Run, two: Run) -> dict[str, Any]:
@@ -89,8 +123,8 @@ def compared(one: Run, two: Run) -> dict[str, Any]:
     branched = min(_branched(a), _branched(b))
     D = [table["sink_stored"][:rows] + table["sink_kinetic"][:rows] for table in (a, b)]
     apart = np.abs(D[1] - D[0]) / D[0][-1]
-    tips = np.nan_to_num(np.max([np.abs(b[name][:rows] - a[name][:rows]) for name in ("tip_x_mm", "tip_y_mm",
-                                                                                     "crack_length_mm")], axis=0))
+    tips = np.max([_apart(a[name][:rows], b[name][:rows])
+                   for name in ("tip_x_mm", "tip_y_mm", "tip_z_mm", "crack_length_mm")], axis=0)
     before, shown = a["time_s"][:rows] < branched, np.unique(np.linspace(0, rows - 1, SHOWN).astype(int))
     ends = [run.summary for run in (one, two)]
     return {
@@ -115,6 +149,13 @@ def _branched(event: Table) -> float:
     return float(event["time_s"][more[0]]) if more.size else np.inf
 
 
+def _apart(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Differences, 0 where neither has a value and infinite where one alone has."""
+    known = np.isfinite(a)
+    apart: np.ndarray = np.where(known == np.isfinite(b), np.abs(np.nan_to_num(b) - np.nan_to_num(a)), np.inf)
+    return apart
+
+
 def _relative(value: float | None, expected: float | None) -> float:
     if value is None or expected is None:
         return 0.0 if value is expected else np.inf
@@ -122,15 +163,19 @@ def _relative(value: float | None, expected: float | None) -> float:
 
 
 def plan(quick: bool) -> list[Planned]:
-    """A point a scene."""
-    return [Planned(name, _Scene(name), float(seconds)) for name, seconds in list(NAMES.items())[:1 if quick else None]]
+    """Events first, of the aneurysm and the scenes, then passes."""
+    events = [*((name, 60) for name in DECKS), *NAMES.items()]
+    if quick:
+        events = events[:1]
+    return [*(Planned(f"event/{name}", _Event(name), 2.0 * seconds) for name, seconds in events),
+            *(Planned(f"passes/{name}", _Passes(name), 3.0 * seconds) for name, seconds in events if name in NAMES)]
 
 
 # --- what comes out ---
 def draw(points: Points, path: Path) -> None:
     """How D and the tips of two ranks leave those of one, against time; a dot where a crack branches first."""
     with page(path, "Two ranks against one", 1, 2, 2.8) as axes:
-        for name, p in points.items():
+        for name, p in _of(points, "event").items():
             time = 1e6 * np.array(p["time_s"], float)
             for ax, key in zip(axes, ("D_apart", "tips_apart_mm")):
                 apart = np.maximum(np.array(p[key], float), 1e-18)
@@ -148,13 +193,23 @@ def table(points: Points) -> list[str]:
     """A row a scene."""
     lines = ["| scene | elements | onset | first branch (µs) | *D* before it | tips before it (mm) | *D* at the end | "
              "branches, failed elements on one; two | balance | twice the same bytes |", "|---" * 10 + "|"]
-    for name, p in points.items():
+    for name, p in _of(points, "event").items():
         at = "never" if p["branched_s"] is None else f"{1e6 * p['branched_s']:.1f}"
         ends = "; ".join(f"{b}, {f}" for b, f in zip(p["branches"], p["failed"]))
         lines.append(f"| {name.replace('_', ' ')} | {p['elements']:,} | {p['onset']:.1e} | {at} | "
                      f"{p['D_before']:.1e} | {p['tips_before_mm']:.1e} | {p['D_end']:.1e} | {ends} | "
-                     f"{p['balance']:.1e} | {'yes' if p['bytes_again'] and p['bytes_of_passes'] else 'no'} |")
+                     f"{p['balance']:.1e} | {'yes' if p['again'] else 'no'} |")
+    if passes := _of(points, "passes"):
+        lines += ["", "| quasi-static, by the first rank | passes | balance | same bytes on two as on one |",
+                  "|---" * 4 + "|"]
+        lines += [f"| {name.replace('_', ' ')} | {p['passes']} | {p['balance']:.1e} | {'yes' if p['same'] else 'no'} |"
+                  for name, p in passes.items()]
     return lines
+
+
+def _of(points: Points, kind: str) -> Points:
+    """The points of events, or of passes, by the name of the scene."""
+    return {key.split("/")[1]: p for key, p in points.items() if key.startswith(kind + "/")}
 
 
 SCENES = Part("scenes", plan, draw, table)
