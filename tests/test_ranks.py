@@ -15,15 +15,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bodies import box
+from bodies import Weight, box
 from plates import SMALL, invoke, plate
 
 from skfsink.errors import ParameterError
 from skfsink.fem.space import Space
 from skfsink.fields.density import DensitySolver
+from skfsink.loads import BodyForce, Grip
+from skfsink.loads.schedule import Loading
 from skfsink.material import SinkLaw
 from skfsink.meshing.vtu import write_mesh
+from skfsink.methods.ranks.part import check_parts
 from skfsink.methods.ranks.partition import numbers, partition
+from skfsink.scene.controls import Controls
 
 HERE = Path(__file__).resolve().parent
 MPIEXEC = shutil.which("mpiexec", path=os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")]))
@@ -81,6 +85,17 @@ def test_parts_are_even_and_their_borders_short() -> None:
     assert abs(np.bincount(part) - 200).max() <= 8
     shared = numbers(space.conn, part)[0].shared[1]
     assert shared.size <= 30  # 21 across the middle
+
+
+def test_a_load_that_does_not_know_parts() -> None:
+    """Fails if a load of one's own is left out on several ranks, or refused after the body is loaded."""
+    space = box("quad", 3)
+    held = (np.flatnonzero(space.X[:, 1] == 0.0), Grip("bottom", (0.0, 0.0)))
+    known = Loading(space, [held], others=[BodyForce(space, 1e-9, (0.0, 1.0))])
+    check_parts(space, known, Controls())
+    own = Loading(space, [held], others=[BodyForce(space, 1e-9, (0.0, 1.0)), Weight(space, 1.0)])
+    with pytest.raises(ParameterError, match=r"^several ranks .* loads of the kind Weight, which has no of_part: "):
+        check_parts(space, own, Controls())
 
 
 @metis
