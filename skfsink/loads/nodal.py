@@ -23,8 +23,8 @@ class NodalLoads:
     With `of_part` and `on` several ranks know it as well; in a part of a body values are the shares of its elements,
     and energies those of the whole.
 
-    Memory: the load time last given to `at` and the elements last given to `keep`; energies are of the loads as these
-    left them.
+    Memory: the load time last given to `at`, the elements last given to `keep` and, in a part of a body, its space last
+    given to `on`: `potential`, `changed`, `effort`, `weigh` and `of_part` are of the loads as these left them.
 
     Attributes
     ----------

@@ -62,7 +62,8 @@ class SlidingPlanes:
     """What planes oblique to the axes hold of a body.
 
     Memory: how data on a pattern become those of a constrained matrix, which `constrained` keeps for each pattern that
-    it was given; it depends on no earlier call.
+    it was given; it depends on no earlier call. In a part of a body, its space last given to `on`, over which `matrix`
+    is.
 
     Parameters
     ----------

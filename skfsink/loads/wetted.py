@@ -20,7 +20,8 @@ __all__ = ["WettedSurface"]
 class WettedSurface:
     """Facets that several loads act on.
 
-    Memory: the facets, and `area` of them, are of the density last given to `keep`.
+    Memory: the facets, and `area` of them, are of the density last given to `keep`; in a part of a body on its space
+    last given to `on`. `of_part` is of the undamaged facets.
 
     Parameters
     ----------
