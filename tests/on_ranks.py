@@ -62,13 +62,13 @@ def pressed(space: Space, side: Callable[[int, float], np.ndarray]) -> Loading:
     """A pressure that goes into cracks, and one that does not."""
     held = Grip("bottom", (0.0,) * space.dim)
     return Loading(space, [(side(1, 0.0), held)],
-                   pressures=[(side(1, 0.4), Pressure("top", 150.0, True)), (side(0, 0.5), Pressure("right", 70.0))])
+                   pressures=[(side(1, 0.4), Pressure("top", 150.0, True)), (side(0, 0.8), Pressure("right", 70.0))])
 
 
 def filled(space: Space, side: Callable[[int, float], np.ndarray]) -> Loading:
     """A fluid over a body that slides along its walls, and is held at the bottom."""
     walls = [(side(i, x), Sliding(name)) for i, x, name in
-             ((0, 0.0, "left"), (0, 0.5, "right"), (2, 0.0, "front"), (2, 0.2, "back")) if i < space.dim]
+             ((0, 0.0, "left"), (0, 0.8, "right"), (2, 0.0, "front"), (2, 0.2, "back")) if i < space.dim]
     return Loading(space, [(side(1, 0.0), Grip("bottom", (None, 0.0, None)[:space.dim])), *walls],
                    pressures=[(side(1, 0.4), Filling("top", 20.0, 1e-2))])
 
@@ -87,8 +87,8 @@ def turned(space: Space, side: Callable[[int, float], np.ndarray]) -> Loading:
 
 
 def loaded_body(dim: int, load: Callable[[Space, Callable[[int, float], np.ndarray]], Loading]) -> Body:
-    """A block under a load; that on oblique planes is turned."""
-    axes = [np.linspace(0, 0.5, 11), np.linspace(0, 0.4, 9), np.linspace(0, 0.2, 5)][:dim]
+    """A block under a load, so long that parts meet at its top; that on oblique planes is turned."""
+    axes = [np.linspace(0, 0.8, 17), np.linspace(0, 0.4, 9), np.linspace(0, 0.2, 5)][:dim]
     mesh = (skfem.MeshQuad if dim == 2 else skfem.MeshHex).init_tensor(*axes)
     X, points = mesh.p.T.copy(), mesh.p.copy()
     if load is oblique:
@@ -192,16 +192,17 @@ def check_event(body: Body, state: State, member: Member) -> None:
 
 
 def check_loads(body: Body, state: State, member: Member) -> None:
-    """Energies, sizes and volumes of loads, also where a crack goes from the top through all parts to the bottom."""
+    """Energies, sizes and volumes of loads, also where cracks go from the top through all parts and along borders."""
     assert member.part is not None
     part, numbers = member.body, member.part.numbers
     nodes, X = numbers.nodes, body.space.X
     own, whole = part.momentum, body.momentum
     centres = X[body.space.conn].mean(axis=1)
-    crack = np.abs(centres[:, 0] - 0.225) < 0.03
-    apart = crack & (np.abs(centres[:, 1] - 0.225) > 0.03)  # the lower half is not joined to the top
+    near = [np.abs(centres - (0.05 * k + 0.025)) < 0.03 for k in range(16)]
+    crosses = [mask[:, 0] | near[k % 8][:, 1] for k, mask in enumerate(near)]
+    apart = near[4][:, 0] & ~near[4][:, 1]  # the lower half is not joined to the top
     last = 0.5 * state.u
-    for deleted in (state.deleted, state.deleted | apart, state.deleted | crack):
+    for deleted in (state.deleted, *(state.deleted | crack for crack in (apart, *crosses))):
         for momentum, gone, gamma, u in ((own, deleted[numbers.elements], state.gamma[nodes], last[nodes]),
                                          (whole, deleted, state.gamma, last)):
             momentum.set_time(2.0 * state.grip)
@@ -209,6 +210,13 @@ def check_loads(body: Body, state: State, member: Member) -> None:
             momentum.set_gamma(gamma, gone)
         check("loaded force", own.force(state.u[nodes]), whole.force(state.u)[nodes])
         check("potential", own.loads, whole.loads)
+        products = []
+        for one, momentum, u in ((part, own, state.u[nodes]), (body, whole, state.u)):
+            pattern, unknowns = Pattern(one.space, X.shape[1], one.free), one.space.exchange.over(one.free)
+            product = pattern.matrix(momentum.tangent(pattern, u)) @ np.sin(unknowns.numbers)
+            unknowns.whole(product)
+            products.append((unknowns.numbers, product))
+        check("tangent", products[0][1], products[1][1][products[0][0]])
         check("work of pressures", own.pressure_work(last[nodes], state.u[nodes]), whole.pressure_work(last, state.u))
         if whole.dead is not None and own.dead is not None:
             check("change", own.dead.changed(0.3 * own.dead.values, state.u[nodes]),
