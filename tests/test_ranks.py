@@ -12,6 +12,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -28,6 +29,7 @@ from skfsink.meshing.vtu import write_mesh
 from skfsink.methods.ranks.part import check_parts
 from skfsink.methods.ranks.partition import numbers, partition
 from skfsink.scene.controls import Controls
+from skfsink.study.ranks_scenes import compared, table
 
 HERE = Path(__file__).resolve().parent
 MPIEXEC = shutil.which("mpiexec", path=os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")]))
@@ -122,6 +124,27 @@ def test_an_unknown_solver_of_the_density(tmp_path: Path) -> None:
     """Fails if a word is taken that means nothing."""
     status, said, _ = invoke("--density-solver", "amg", "--out", tmp_path / "run")
     assert (status, said) == (2, "skfsink: density_solver must be one of multigrid, jacobi; got 'amg'\n")
+
+
+def test_differences_are_told_before_and_after_the_first_branch() -> None:
+    """Fails if what rounding does after a crack has branched counts as before, or a tip that one run lacks as none."""
+    def event(branched: float, tip: float) -> SimpleNamespace:
+        D = np.array([0.0, 1.0, 2.0, branched])
+        table = {"time_s": np.arange(4.0), "branches": np.array([0, 2, 2, 3]), "sink_stored": D, "sink_kinetic": 0 * D,
+                 "tip_x_mm": np.array([np.nan, 1.0, tip, 3.0]), "tip_y_mm": D, "tip_z_mm": np.full(4, np.nan),
+                 "crack_length_mm": 0 * D}
+        return SimpleNamespace(event=table, summary={
+            "onset": {"elastic_energy": 2.0, "displacement_mm": 1.0, "place_mm": [0.0]},
+            "energy": {"D_sink_final": branched, "balance_error_relative": 1e-15}, "deleted_elements": 3,
+            "event": {"first_arrival_s": None, "max_branches": 3}})
+
+    found = compared(event(4.0, 2.0), event(5.0, 2.0))
+    assert (found["branched_s"], found["rows"], found["D_before"], found["tips_before_mm"]) == (3.0, 3, 0.0, 0.0)
+    assert (found["D_end"], found["tips_end_mm"], found["arrival_end"], found["onset"]) == (0.25, 1.0, 0.0, 0.0)
+    assert compared(event(4.0, 2.0), event(4.0, np.nan))["tips_before_mm"] == np.inf
+    (row,) = [line for line in table({"event/a_b": {**found, "elements": 9, "again": True}}) if "a b" in line]
+    assert row.startswith("| a b | 9 | 0.0e+00 | 3000000.0 |")
+    assert row.endswith("| 2.5e-01 | 3, 3; 3, 3 | 1.0e-15 | yes |")
 
 
 # --- all ranks ---
