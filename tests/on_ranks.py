@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import traceback
+from collections.abc import Callable
+
 import numpy as np
 import skfem
 from mpi4py import MPI
@@ -14,6 +17,7 @@ from skfsink.fields.density import DensitySolver
 from skfsink.fields.fragments import debris
 from skfsink.fields.momentum import Momentum
 from skfsink.fields.state import State
+from skfsink.loads import BodyForce, Filling, Grip, Pressure, Ramp, Rotation, Sliding, Traction
 from skfsink.loads.schedule import Loading
 from skfsink.material import AAA, SinkLaw
 from skfsink.material.regions import Region
@@ -44,9 +48,62 @@ def whole_body(dim: int, rings: bool = False) -> Body:
     return Body(momentum, DensitySolver(space, LAW, regions=[region], solver="jacobi"), loading)
 
 
+def dead(space: Space, side: Callable[[int, float], np.ndarray]) -> Loading:
+    """A traction, and a weight that falls with the density; of a part of the body too."""
+    held = Grip("bottom", (0.0,) * space.dim)
+    pull = Traction("top", (20.0, Ramp((0.0, 1.0), (0.0, 100.0)), 0.0)[:space.dim])
+    fall = (0.0, 2e9, 0.0)[:space.dim]
+    corner = np.flatnonzero((space.X[space.conn].mean(axis=1) < 0.2).all(axis=1))
+    return Loading(space, [(side(1, 0.0), held)], [(side(1, 0.4), pull)],
+                   [BodyForce(space, 1e-9, fall), BodyForce(space, 2e-9, fall, corner)])
+
+
+def pressed(space: Space, side: Callable[[int, float], np.ndarray]) -> Loading:
+    """A pressure that goes into cracks, and one that does not."""
+    held = Grip("bottom", (0.0,) * space.dim)
+    return Loading(space, [(side(1, 0.0), held)],
+                   pressures=[(side(1, 0.4), Pressure("top", 150.0, True)), (side(0, 0.8), Pressure("right", 70.0))])
+
+
+def filled(space: Space, side: Callable[[int, float], np.ndarray]) -> Loading:
+    """A fluid over a body that slides along its walls, and is held at the bottom."""
+    walls = [(side(i, x), Sliding(name)) for i, x, name in
+             ((0, 0.0, "left"), (0, 0.8, "right"), (2, 0.0, "front"), (2, 0.2, "back")) if i < space.dim]
+    return Loading(space, [(side(1, 0.0), Grip("bottom", (None, 0.0, None)[:space.dim])), *walls],
+                   pressures=[(side(1, 0.4), Filling("top", 20.0, 1e-2))])
+
+
+def oblique(space: Space, side: Callable[[int, float], np.ndarray]) -> Loading:
+    """A turned body on two planes."""
+    return Loading(space, [(side(0, 0.0), Sliding("left")), (side(1, 0.0), Sliding("bottom"))])
+
+
+def turned(space: Space, side: Callable[[int, float], np.ndarray]) -> Loading:
+    """A grip that turns ever faster."""
+    angle = Ramp((0.0, 1e-3, 2e-3), (0.0, 1.0, 5.0))
+    return Loading(space, [(side(1, 0.0), Grip("bottom", (0.0,) * space.dim)),
+                           (side(1, 0.4), Rotation("top", angle, (0.2, 0.1, 0.1)[:space.dim],
+                                                   (0.0, 1.0, 2.0) if space.dim == 3 else ()))])
+
+
+def loaded_body(dim: int, load: Callable[[Space, Callable[[int, float], np.ndarray]], Loading]) -> Body:
+    """A block under a load, so long that parts meet at its top; that on oblique planes is turned."""
+    axes = [np.linspace(0, 0.8, 17), np.linspace(0, 0.4, 9), np.linspace(0, 0.2, 5)][:dim]
+    mesh = (skfem.MeshQuad if dim == 2 else skfem.MeshHex).init_tensor(*axes)
+    X, points = mesh.p.T.copy(), mesh.p.copy()
+    if load is oblique:
+        points[:2] = np.array([[0.8, -0.6], [0.6, 0.8]]) @ points[:2]
+    space = Space(type(mesh)(points, mesh.t))
+    loading = load(space, lambda axis, at: np.flatnonzero(np.abs(X[:, axis] - at) < 1e-9))
+    momentum = Momentum(space, AAA(viscosity=1e-8), dead=loading.dead, followers=loading.followers)
+    return Body(momentum, DensitySolver(space, LAW, solver="jacobi"), loading)
+
+
 def stretched(body: Body) -> State:
     """A state on its way to failure, with a hole and debris: the same on all ranks."""
     X, state = body.space.X, body.begin()
+    state.grip = 1e-3
+    body.momentum.set_time(state.grip)
     state.u[:, 1] = 0.06 * X[:, 1] * (1 + 0.3 * np.sin(7 * X[:, 0]))
     state.v[:, 0] = 300.0 * np.cos(5 * X[:, 1]) * body.free.reshape(X.shape)[:, 0]
     body.momentum.force(state.u)
@@ -134,18 +191,73 @@ def check_event(body: Body, state: State, member: Member) -> None:
     check("time", (member.state.time, member.state.step), (state.time, state.step), 1e-9)
 
 
+def check_loads(body: Body, state: State, member: Member) -> None:
+    """Energies, sizes and volumes of loads, also where cracks go from the top through all parts and along borders."""
+    assert member.part is not None
+    part, numbers = member.body, member.part.numbers
+    nodes, X = numbers.nodes, body.space.X
+    own, whole = part.momentum, body.momentum
+    centres = X[body.space.conn].mean(axis=1)
+    near = [np.abs(centres - (0.05 * k + 0.025)) < 0.03 for k in range(16)]
+    crosses = [mask[:, 0] | near[k % 8][:, 1] for k, mask in enumerate(near)]
+    apart = near[4][:, 0] & ~near[4][:, 1]  # the lower half is not joined to the top
+    last = 0.5 * state.u
+    for deleted in (state.deleted, *(state.deleted | crack for crack in (apart, *crosses))):
+        for momentum, gone, gamma, u in ((own, deleted[numbers.elements], state.gamma[nodes], last[nodes]),
+                                         (whole, deleted, state.gamma, last)):
+            momentum.set_time(2.0 * state.grip)
+            momentum.force(u)
+            momentum.set_gamma(gamma, gone)
+        check("loaded force", own.force(state.u[nodes]), whole.force(state.u)[nodes])
+        check("potential", own.loads, whole.loads)
+        products = []
+        for one, momentum, u in ((part, own, state.u[nodes]), (body, whole, state.u)):
+            pattern, unknowns = Pattern(one.space, X.shape[1], one.free), one.space.exchange.over(one.free)
+            product = pattern.matrix(momentum.tangent(pattern, u)) @ np.sin(unknowns.numbers)
+            unknowns.whole(product)
+            products.append((unknowns.numbers, product))
+        check("tangent", products[0][1], products[1][1][products[0][0]])
+        check("work of pressures", own.pressure_work(last[nodes], state.u[nodes]), whole.pressure_work(last, state.u))
+        if whole.dead is not None and own.dead is not None:
+            check("change", own.dead.changed(0.3 * own.dead.values, state.u[nodes]),
+                  whole.dead.changed(0.3 * whole.dead.values, state.u))
+            check("effort", own.dead.effort(0.3 * own.dead.values, state.u[nodes]),
+                  whole.dead.effort(0.3 * whole.dead.values, state.u))
+        if whole.followers is not None and own.followers is not None:
+            inverse = body.free.reshape(X.shape) / whole.lumped_mass(1e-3)[:, None]
+            for name in ("swept", "area", "pressures", "size"):
+                check(name, getattr(own.followers, name)(state.u[nodes]), getattr(whole.followers, name)(state.u))
+            check("stiffest", own.followers.stiffest(state.u[nodes], inverse[nodes]),
+                  whole.followers.stiffest(state.u, inverse))
+            check("facets", part.space.exchange.total(own.followers._wet.owner.size), whole.followers._wet.owner.size)
+
+
+def check_all(body: Body) -> None:
+    """Check the parts of a body."""
+    state = stretched(body)
+    member = Member(COMM)
+    member.take(parts_of(body, ExplicitControls(), COMM.size)[COMM.rank])
+    check_sums(body, state, member)
+    check_debris(body, member)
+    check_loads(body, state, member)
+    body.take(state)
+    member.take(parts_of(body, ExplicitControls(), COMM.size)[COMM.rank])
+    check_event(body, state, member)
+
+
 def main() -> None:
-    """Check a plane body, one in space, and one of revolution."""
+    """Check a plane body, one in space, one of revolution, and both of the first under loads of all kinds."""
     for dim, rings in ((2, False), (3, False), (2, True)):
-        body = whole_body(dim, rings)
-        state = stretched(body)
-        member = Member(COMM)
-        member.take(parts_of(body, ExplicitControls(), COMM.size)[COMM.rank])
-        check_sums(body, state, member)
-        check_debris(body, member)
-        check_event(body, state, member)
+        check_all(whole_body(dim, rings))
+    for dim in (2, 3):
+        for load in (dead, pressed, filled, oblique, turned):
+            check_all(loaded_body(dim, load))
     print(f"rank {COMM.rank} of {COMM.size}: as the whole body", flush=True)
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except BaseException:
+        traceback.print_exc()
+        COMM.Abort(4)

@@ -12,17 +12,24 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from bodies import box
-from plates import SMALL, invoke
+from bodies import Weight, box
+from plates import SMALL, invoke, plate
 
 from skfsink.errors import ParameterError
 from skfsink.fem.space import Space
 from skfsink.fields.density import DensitySolver
+from skfsink.loads import BodyForce, Grip
+from skfsink.loads.schedule import Loading
 from skfsink.material import SinkLaw
+from skfsink.meshing.vtu import write_mesh
+from skfsink.methods.ranks.part import check_parts
 from skfsink.methods.ranks.partition import numbers, partition
+from skfsink.scene.controls import Controls
+from skfsink.study.ranks_scenes import compared, table
 
 HERE = Path(__file__).resolve().parent
 MPIEXEC = shutil.which("mpiexec", path=os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")]))
@@ -82,6 +89,17 @@ def test_parts_are_even_and_their_borders_short() -> None:
     assert shared.size <= 30  # 21 across the middle
 
 
+def test_a_load_that_does_not_know_parts() -> None:
+    """Fails if a load of one's own is left out on several ranks, or refused after the body is loaded."""
+    space = box("quad", 3)
+    held = (np.flatnonzero(space.X[:, 1] == 0.0), Grip("bottom", (0.0, 0.0)))
+    known = Loading(space, [held], others=[BodyForce(space, 1e-9, (0.0, 1.0))])
+    check_parts(space, known, Controls())
+    own = Loading(space, [held], others=[BodyForce(space, 1e-9, (0.0, 1.0)), Weight(space, 1.0)])
+    with pytest.raises(ParameterError, match=r"^several ranks .* loads of the kind Weight, which has no of_part: "):
+        check_parts(space, own, Controls())
+
+
 @metis
 def test_more_ranks_than_elements() -> None:
     """Fails if a rank may be left without a part."""
@@ -106,6 +124,27 @@ def test_an_unknown_solver_of_the_density(tmp_path: Path) -> None:
     """Fails if a word is taken that means nothing."""
     status, said, _ = invoke("--density-solver", "amg", "--out", tmp_path / "run")
     assert (status, said) == (2, "skfsink: density_solver must be one of multigrid, jacobi; got 'amg'\n")
+
+
+def test_differences_are_told_before_and_after_the_first_branch() -> None:
+    """Fails if what rounding does after a crack has branched counts as before, or a tip that one run lacks as none."""
+    def event(branched: float, tip: float) -> SimpleNamespace:
+        D = np.array([0.0, 1.0, 2.0, branched])
+        table = {"time_s": np.arange(4.0), "branches": np.array([0, 2, 2, 3]), "sink_stored": D, "sink_kinetic": 0 * D,
+                 "tip_x_mm": np.array([np.nan, 1.0, tip, 3.0]), "tip_y_mm": D, "tip_z_mm": np.full(4, np.nan),
+                 "crack_length_mm": 0 * D}
+        return SimpleNamespace(event=table, summary={
+            "onset": {"elastic_energy": 2.0, "displacement_mm": 1.0, "place_mm": [0.0]},
+            "energy": {"D_sink_final": branched, "balance_error_relative": 1e-15}, "deleted_elements": 3,
+            "event": {"first_arrival_s": None, "max_branches": 3}})
+
+    found = compared(event(4.0, 2.0), event(5.0, 2.0))
+    assert (found["branched_s"], found["rows"], found["D_before"], found["tips_before_mm"]) == (3.0, 3, 0.0, 0.0)
+    assert (found["D_end"], found["tips_end_mm"], found["arrival_end"], found["onset"]) == (0.25, 1.0, 0.0, 0.0)
+    assert compared(event(4.0, 2.0), event(4.0, np.nan))["tips_before_mm"] == np.inf
+    (row,) = [line for line in table({"event/a_b": {**found, "elements": 9, "again": True}}) if "a b" in line]
+    assert row.startswith("| a b | 9 | 0.0e+00 | 3000000.0 |")
+    assert row.endswith("| 2.5e-01 | 3, 3; 3, 3 | 1.0e-15 | yes |")
 
 
 # --- all ranks ---
@@ -162,23 +201,69 @@ def test_runs_on_several_ranks_are_those_on_one(mesh: Path, tmp_path: Path) -> N
 
 @ranks
 @pytest.mark.slow
-@pytest.mark.parametrize("count", [1, 2, 3])
-def test_a_lost_rank_ends_all_and_the_run_goes_on(count: int, mesh: Path, tmp_path: Path) -> None:
-    """Fails if a run waits for a rank that is gone, or its checkpoint is of that number of ranks alone."""
-    finished(on(2, *case("--mesh", mesh, *ARGUMENTS, "--out", tmp_path / "whole")))
-    run, choose = tmp_path / "run", random.Random(count)
+def test_loads_of_all_kinds_on_several_ranks(tmp_path: Path) -> None:
+    """Fails if a load is not that of the whole body on any number of ranks, its ledger opens, or a run that was stopped
+    on two ranks does not go on on three as it would have on one."""
+    script = HERE / "loads_on_ranks.py"
+    finished([sys.executable, str(script), str(tmp_path / "one")])
+    for count, name, how in ((2, "two", []), (3, "three", []), (2, "stopped", ["stop"]), (3, "stopped", ["resume"])):
+        finished(on(count, "-m", "skfsink.methods.ranks", script, tmp_path / name, *how))
+    for kind in ("dead", "pressure", "filling", "oblique", "turn"):
+        one = _rows(tmp_path / "one" / kind)
+        assert int(one[-1]["deleted_elements"]) > 0
+        for name in ("two", "three", "stopped"):
+            rows = _rows(tmp_path / name / kind)
+            _check_same(rows, one)
+            balance = next(column for column in rows[0] if column.startswith("balance"))
+            scale = max(float(row[f"elastic{balance[7:]}"]) for row in rows)
+            assert max(abs(float(row[balance])) for row in rows if row["phase"] == "event") < 1e-9 * scale
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path, float]:
+    """Mesh and folder of a run on two ranks that nothing ends, and how long it takes [s]."""
+    folder = tmp_path_factory.mktemp("whole")
+    write_mesh(folder / "plate.vtu", plate())
+    began = time.perf_counter()
+    finished(on(2, *case("--mesh", folder / "plate.vtu", *ARGUMENTS, "--out", folder / "run")))
+    return folder / "plate.vtu", folder / "run", time.perf_counter() - began
+
+
+@ranks
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(10))
+def test_a_lost_rank_ends_all_and_the_run_goes_on(seed: int, whole: tuple[Path, Path, float], tmp_path: Path) -> None:
+    """Fails if a run waits for a rank that is lost at any moment, leaves a checkpoint that is torn, a lock or a
+    process, or does not go on on another number of ranks to the same results."""
+    mesh, expected, duration = whole
+    run, choose = tmp_path / "run", random.Random(seed)
+    moment, victim, count = choose.uniform(0.0, duration), choose.randrange(2), 1 + seed % 3
+    began = time.perf_counter()
     with subprocess.Popen(on(2, *case("--mesh", mesh, *ARGUMENTS, "--out", run)), cwd=HERE.parent,
                           stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, start_new_session=True) as program:
-        while not (run / "onset.npz").exists() and program.poll() is None:
-            time.sleep(0.05)
-        time.sleep(choose.uniform(0.5, 3.0))
-        victims = _ranks_of(program.pid)
-        if program.poll() is None and victims:
-            os.kill(choose.choice(victims), signal.SIGKILL)
+        while program.poll() is None and (time.perf_counter() - began < moment or len(_ranks_of(program.pid)) < 2):
+            time.sleep(0.01)
+        victims = sorted(_ranks_of(program.pid)) if program.poll() is None else []
+        if victims:
+            os.kill(victims[victim], signal.SIGKILL)
         program.communicate(timeout=60)
-    goes_on = on(count, *case("--resume", run))
-    finished(goes_on if count > 1 else goes_on[3:])
-    _check_same(_rows(run), _rows(tmp_path / "whole"))
+    time.sleep(0.2)
+    assert not [pid for pid in victims if _lives(pid)]
+    begun = (run / "checkpoint.npz").exists()  # or else it is started again
+    again = case("--resume", run) if begun else case("--mesh", mesh, *ARGUMENTS, "--out", run, "--overwrite")
+    finished(on(count, *again) if count > 1 else [sys.executable, *map(str, again)])
+    _check_same(_rows(run), _rows(expected))
+    assert _files(run) == _files(expected)
+
+
+def _files(folder: Path) -> set[str]:
+    return {str(path.relative_to(folder)) for path in folder.rglob("*")}
+
+
+def _lives(pid: int) -> bool:
+    """Whether there is such a process, and it is not one that only waits to be buried."""
+    import psutil
+    return bool(psutil.pid_exists(pid) and psutil.Process(pid).status() != psutil.STATUS_ZOMBIE)
 
 
 def _ranks_of(pid: int) -> list[int]:

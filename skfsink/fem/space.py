@@ -237,9 +237,13 @@ class Space:
 
     def lump(self, values: np.ndarray) -> np.ndarray:
         """Row sums of the mass matrix with weight `values` (ne, nq):  sum_q w_q values_q N_a(q), (n,)."""
+        return self.exchange.whole(self.lumped(values))
+
+    def lumped(self, values: np.ndarray) -> np.ndarray:
+        """The share of this part in these row sums, (n,)."""
         out = np.zeros(self.n_nodes)
         _lump(self.w, np.ascontiguousarray(values, float), self.nodes, self.N, out)
-        return self.exchange.whole(out)
+        return out
 
     @cached_property
     def nodes(self) -> np.ndarray:

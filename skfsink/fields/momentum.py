@@ -245,12 +245,12 @@ class Momentum:
         exchange, least = self.space.exchange, self.backend.force(u, out)
         self.least_J = -exchange.greatest(-least)
         self.energy = exchange.total(self.backend.energy)
-        exchange.whole(out)
         if self.dead is not None:
             out[self.dead.nodes] -= self.dead.values
             self.loads = self.dead.potential(u)
         if self.followers is not None:
             self.followers.add_force(u, out)
+        exchange.whole(out)
         if self.contact is not None:
             self.contact.add_force(placed, out)
         self.evaluations += 1

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from copy import copy
+from typing import Self
+
 import numpy as np
 
 from ..errors import ParameterError
+from ..fem.selection import Selection
 from ..fem.space import Space
 from .grips import Ramp
 from .nodal import NodalLoads
@@ -44,6 +48,7 @@ class BodyForce(NodalLoads):
             raise ParameterError("a body force on a body of revolution acts along its axis: leave x out, which is the "
                                  "radius")
         self.space, self._rates, self._time = space, rate, 0.0
+        self._size = float(np.ptp(space.X, axis=0).max())
         self.ramps = tuple(value for value in rate if isinstance(value, Ramp))
         self.elements = np.arange(space.n_elements) if elements is None else np.asarray(elements)
         self.nodes = np.unique(space.conn[self.elements])
@@ -63,12 +68,26 @@ class BodyForce(NodalLoads):
     def rate(self, t: float) -> float:
         """Change of the greatest stress that it can bring from load time `t` on: rho0 b' times the size [MPa/s]."""
         rates = [value.rate(t) if isinstance(value, Ramp) else value for value in self._rates]
-        return float(self._rho0.max() * np.linalg.norm(rates) * np.ptp(self.space.X, axis=0).max())
+        return float(self._rho0.max() * np.linalg.norm(rates) * self._size)
 
     def keep(self, alive: np.ndarray) -> None:
         """Nothing: :meth:`weigh` says what is left."""
 
     def weigh(self, gamma: np.ndarray) -> None:
         """Let the loads be those of material with the relative density `gamma` (ne, nq)."""
-        self._mass = self.space.lump(gamma * self._rho0)[self.nodes]
+        self._mass = self.space.lumped(gamma * self._rho0)[self.nodes]
         self.at(self._time)
+
+    # --- parts of a body ---
+    def of_part(self, part: Selection) -> Self:
+        """What a part of the body has of it: its elements."""
+        own, here = copy(self), part.element[self.elements]
+        own.elements, own._rho0 = here[here >= 0], self._rho0[part.elements]
+        del own.space, own._mass, own.values
+        return own
+
+    def on(self, space: Space) -> None:
+        """Act on the `space` of the part."""
+        super().on(space)
+        self.space, self.nodes = space, np.unique(space.conn[self.elements])
+        self.weigh(np.ones_like(space.w))

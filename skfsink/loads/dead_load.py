@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
+from typing import Self
 
 import numpy as np
 import skfem
 
 from ..errors import MeshError, ParameterError
+from ..fem.selection import Selection
 from ..fem.space import Space
 from .grips import Ramp, Traction
 from .nodal import NodalLoads
@@ -42,7 +45,6 @@ class DeadLoad(NodalLoads):
     """
 
     def __init__(self, space: Space, tractions: Sequence[tuple[np.ndarray, Traction]]) -> None:
-        self.space = space
         self._rates = [tuple(value for value in traction.rate) for _, traction in tractions]
         boundary, elements, corners, weights, owner = space.mesh.boundary_facets(), [], [], [], []
         for number, (nodes, traction) in enumerate(tractions):
@@ -63,17 +65,21 @@ class DeadLoad(NodalLoads):
         self.nodes, corner = np.unique(np.concatenate(corners)[on_facet], return_inverse=True)
         self._corner, self._weight, self._facet = corner.ravel(), weight[on_facet], np.nonzero(on_facet)[0]
         self._owner = np.concatenate(owner)
-        self._time, self._alive = 0.0, np.zeros(0, bool)
-        self.keep(np.ones(self.elements.size, bool))
+        self._time, self._alive = 0.0, np.ones(self.elements.size, bool)
+        self._spread()
 
     def keep(self, alive: np.ndarray) -> None:
         """Let loads act only on the facets whose element is `alive` (f,)."""
         if np.array_equal(alive, self._alive):
             return
         self._alive = alive.copy()
+        self._spread()
+
+    def _spread(self) -> None:
+        """Areas of the facets that are alive, by their nodes."""
         k = self.nodes.size
         place = self._owner[self._facet] * k + self._corner
-        areas = np.bincount(place, self._weight * alive[self._facet], minlength=len(self._rates) * k)
+        areas = np.bincount(place, self._weight * self._alive[self._facet], minlength=len(self._rates) * k)
         self._areas: np.ndarray = areas.reshape(len(self._rates), k)
         self.at(self._time)
 
@@ -104,3 +110,15 @@ class DeadLoad(NodalLoads):
         full = np.bincount(self._corner, self._weight * (self._owner[self._facet] == number), minlength=self.nodes.size)
         mean: np.ndarray = full @ u[self.nodes] / full.sum()
         return mean
+
+    # --- parts of a body ---
+    def of_part(self, part: Selection) -> Self:
+        """What a part of the body has of them: the facets of its elements."""
+        own, mine = copy(self), part.element[self.elements] >= 0
+        entry = mine[self._facet]
+        own.elements, own._owner, own._alive = part.element[self.elements[mine]], self._owner[mine], self._alive[mine]
+        corners, own._corner = np.unique(self._corner[entry], return_inverse=True)
+        own.nodes, own._weight = part.node[self.nodes[corners]], self._weight[entry]
+        own._facet = (np.cumsum(mine) - 1)[self._facet[entry]]
+        own._spread()
+        return own

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from copy import copy
 
 import numpy as np
 from scipy.sparse import coo_array, csr_array
@@ -11,6 +13,7 @@ from ..errors import ParameterError
 from ..fem.facets import Facets
 from ..fem.kernels.surface import add_pressure, pressure_tangents, swept_volumes
 from ..fem.pattern import Pattern
+from ..fem.selection import Selection
 from ..fem.space import Space
 from .grips import Ramp
 from .pressure import Filling, Pressure
@@ -29,8 +32,9 @@ class FollowerLoads:
 
     Memory: the load time last given to `at`; the facets that bear load, of the density last given to `keep`; the
     displacement last given to `add_force` or `size`, at which the volume below a facet that fails is kept; what `hold`
-    has added to fluids. `pressures`, `work`, `add_stiffness`, `skew`, `stiffening`, `stiffest`, `swept`, `area` and
-    `nodes` are for these; `memory` gives what a checkpoint needs, and `restore` takes it up.
+    has added to fluids; in a part of a body, its space last given to `on`. `of_part`, `check_closed`, `pressures`,
+    `work`, `add_stiffness`, `skew`, `stiffening`, `stiffest`, `swept`, `area` and `nodes` are for these; `memory` gives
+    what a checkpoint needs, and `restore` takes it up.
 
     Parameters
     ----------
@@ -42,6 +46,7 @@ class FollowerLoads:
     values: of each load at the time last given to `at`: a pressure [MPa], or the volume pumped in [mm^volume_dim];
         replaced, never changed.
     areas: of the undeformed boundaries [mm^(volume_dim-1)].
+    places: of its facets of undamaged boundaries among those of the whole body, of which it is a part, (b,).
 
     Raises
     ------
@@ -59,6 +64,7 @@ class FollowerLoads:
         self._kept_volume = np.zeros(self._wet.bears.size)  # swept below each facet that does not bear load any more
         self._added = np.zeros(len(self.loads))             # to the volumes pumped in, at the start of an event
         self._last: np.ndarray | None = None                # displacement last evaluated
+        self.places = np.arange(self._wet.bears.size)
         self.areas = self.area(np.zeros_like(space.X))
         self.at(0.0)
 
@@ -66,6 +72,21 @@ class FollowerLoads:
     def nodes(self) -> np.ndarray:
         """Nodes of the facets that bear load now, (k,)."""
         return self._wet.nodes
+
+    # --- parts of a body ---
+    def of_part(self, part: Selection) -> FollowerLoads:
+        """What a part of the body has of them, to be put `on` the space of this part: forces are its shares then."""
+        own = copy(self)
+        own._wet = self._wet.of_part(part)
+        own.places = np.flatnonzero(part.element[self._wet.boundary.elements] >= 0)
+        own._kept_volume, own._added, own._last = self._kept_volume[own.places], self._added.copy(), None
+        del own.space
+        return own
+
+    def on(self, space: Space) -> None:
+        """Act on the `space` of the part."""
+        self.space = space
+        self._wet.on(space)
 
     # --- the loads at a time ---
     def at(self, t: float) -> None:
@@ -114,7 +135,10 @@ class FollowerLoads:
             self._added[k] = pressures[k] * load.compliance + volumes[k] - self.values[k]
 
     def add_force(self, u: np.ndarray, out: np.ndarray) -> None:
-        """Take the forces at the displacement `u` from `out`, both (n, dim): it is the internal force less loads."""
+        """Take the forces at the displacement `u` from `out`, both (n, dim): it is the internal force less loads.
+
+        In a part of a body, the shares of its facets.
+        """
         if self._fillings:
             self._last = u.copy()
         part = np.zeros_like(self._wet.X)
@@ -126,7 +150,9 @@ class FollowerLoads:
         """Norm of the nodal forces at `u` [N; N/mm in 2D]."""
         out = np.zeros_like(self.space.X)
         self.add_force(u, out)
-        return float(np.linalg.norm(out))
+        exchange = self.space.exchange
+        counted = exchange.whole(out)[exchange.counted]
+        return math.sqrt(exchange.total(float(np.vdot(counted, counted))))
 
     def work(self, before: np.ndarray, u: np.ndarray, end: np.ndarray, equilibria: bool = False) -> float:
         """Work on the straight way from `u` to `end` (n, dim), while `values` (loads,) go evenly from those `before`.
@@ -145,7 +171,7 @@ class FollowerLoads:
         out = np.empty(self._wet.owner.size)
         swept_volumes(self._wet.corner, self._wet.X + u[self._wet.nodes], end[self._wet.nodes] - u[self._wet.nodes],
                       np.stack([first[self._wet.owner], last[self._wet.owner]]), out, self.space.axisymmetric)
-        return float(out.sum())
+        return self.space.exchange.total(float(out.sum()))
 
     def add_stiffness(self, pattern: Pattern, u: np.ndarray, data: np.ndarray) -> None:
         """Add the symmetric part of the load stiffness at `u`, at fixed pressures, to `data` on the `pattern`."""
@@ -160,7 +186,7 @@ class FollowerLoads:
     def _unknowns(self) -> np.ndarray:
         """Unknowns of the facets by their numbers in the element, (f, k*dim)."""
         dim, local = self.space.dim, self._wet.facets.local
-        unknowns: np.ndarray = (local[:, :, None] * dim + np.arange(dim)).reshape(len(local), -1)
+        unknowns: np.ndarray = (local[:, :, None] * dim + np.arange(dim)).reshape(len(local), dim * local.shape[1])
         return unknowns
 
     def skew(self, u: np.ndarray, free: np.ndarray, sliding: SlidingPlanes | None = None) -> csr_array | None:
@@ -219,12 +245,17 @@ class FollowerLoads:
             add_pressure(self._wet.corner, np.where(self._wet.owner == k, load.compliance**-0.5, 0.0),
                          self._wet.X + u[self._wet.nodes], part, self.space.axisymmetric)
             column[self._wet.nodes] = part
+            self.space.exchange.whole(column)
         return columns.reshape(len(columns), -1).T
 
     def stiffest(self, u: np.ndarray, inverse_mass: np.ndarray) -> float:
         """Bound of what fluids add to the highest frequency squared at `u` [1/s^2]; `inverse_mass` is (n, dim)."""
         B = self.stiffening(u)
-        return 0.0 if B is None else float(np.einsum("ik,i,ik->", B, inverse_mass.ravel(), B))
+        if B is None:
+            return 0.0
+        exchange = self.space.exchange
+        weights = np.where(exchange.counts(self.space.n_nodes)[:, None], inverse_mass, 0.0).ravel()
+        return exchange.total(float(np.einsum("ik,i,ik->", B, weights, B)))
 
     # --- volumes and areas ---
     def swept(self, u: np.ndarray) -> np.ndarray:
@@ -235,8 +266,8 @@ class FollowerLoads:
         """
         count = len(self.loads)
         volumes = np.bincount(self._wet.owner, self._swept(u, self._wet.facets), minlength=count)
-        total: np.ndarray = volumes + np.bincount(self._wet.boundary_owner, self._kept_volume, minlength=count)
-        return total
+        volumes = volumes + np.bincount(self._wet.boundary_owner, self._kept_volume, minlength=count)
+        return self.space.exchange.sums(volumes)
 
     def _swept(self, u: np.ndarray, facets: Facets) -> np.ndarray:
         out = np.empty(facets.elements.size)
@@ -245,8 +276,7 @@ class FollowerLoads:
 
     def area(self, u: np.ndarray) -> np.ndarray:
         """Area of the boundaries that bear load, deformed by `u`, (loads,) [mm^2; mm in 2D]."""
-        area: np.ndarray = np.bincount(self._wet.owner, self._wet.area(u), minlength=len(self.loads))
-        return area
+        return self.space.exchange.sums(np.bincount(self._wet.owner, self._wet.area(u), minlength=len(self.loads)))
 
     # --- checkpoints ---
     def memory(self) -> dict[str, np.ndarray]:

@@ -3,9 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
+from typing import Self
 
 import numpy as np
 
+from ..errors import ParameterError
+from ..fem.exchange import ALONE, Exchange
+from ..fem.selection import Selection
+from ..fem.space import Space
 from .grips import Ramp
 
 __all__ = ["NodalLoads", "Together"]
@@ -14,8 +20,11 @@ __all__ = ["NodalLoads", "Together"]
 class NodalLoads:
     """Forces at nodes that keep their direction. A new kind of load derives from it and gives `at`, `rate`, `keep`.
 
-    Memory: the load time last given to `at` and the elements last given to `keep`; energies are of the loads as these
-    left them.
+    With `of_part` and `on` several ranks know it as well; in a part of a body values are the shares of its elements,
+    and energies those of the whole.
+
+    Memory: the load time last given to `at`, the elements last given to `keep` and, in a part of a body, its space last
+    given to `on`: `potential`, `changed`, `effort`, `weigh` and `of_part` are of the loads as these left them.
 
     Attributes
     ----------
@@ -24,7 +33,10 @@ class NodalLoads:
     elements: on which they act, (f,); those that have lost their force bear no load any more.
     ramps: that they follow; load increments end at their points.
     weighs: whether they fall with the density, which `weigh` is given then.
+    exchange: with the other parts of the body.
     """
+
+    exchange: Exchange = ALONE
 
     nodes: np.ndarray
     values: np.ndarray
@@ -50,15 +62,31 @@ class NodalLoads:
     # --- energy ---
     def potential(self, u: np.ndarray) -> float:
         """-f.u of the loads at the displacement `u` (n, dim) [N mm; N mm/mm in 2D]."""
-        return -float(np.vdot(self.values, u[self.nodes]))
+        return -self.exchange.total(float(np.vdot(self.values, u[self.nodes])))
 
     def changed(self, before: np.ndarray, u: np.ndarray) -> float:
         """Work -u.df of the change of the loads from `before` (k, dim), at the displacement `u` (n, dim)."""
-        return -float(np.vdot(self.values - before, u[self.nodes]))
+        return -self.exchange.total(float(np.vdot(self.values - before, u[self.nodes])))
 
     def effort(self, before: np.ndarray, du: np.ndarray) -> float:
         """Trapezoidal work f.du of loads that were `before` (k, dim) on the way `du` (n, dim)."""
-        return 0.5 * float(np.vdot(self.values + before, du[self.nodes]))
+        return 0.5 * self.exchange.total(float(np.vdot(self.values + before, du[self.nodes])))
+
+    # --- parts of a body ---
+    def of_part(self, part: Selection) -> Self:
+        """What a part of the body has of them, to be put `on` the space of this part.
+
+        Raises
+        ------
+        ParameterError
+            The kind of load does not know parts.
+        """
+        raise ParameterError(f"several ranks do not know loads of the kind {type(self).__name__}, which has no "
+                             f"of_part: start it on one rank")
+
+    def on(self, space: Space) -> None:
+        """Act on the `space` of the part."""
+        self.exchange = space.exchange
 
 
 class Together(NodalLoads):
@@ -68,7 +96,11 @@ class Together(NodalLoads):
     """
 
     def __init__(self, loads: Sequence[NodalLoads], n_nodes: int) -> None:
-        self.loads, self._n_nodes = tuple(loads), n_nodes
+        self.loads = tuple(loads)
+        self._join(n_nodes)
+
+    def _join(self, n_nodes: int) -> None:
+        self._n_nodes = n_nodes
         self.nodes = np.unique(np.concatenate([load.nodes for load in self.loads]))
         self.elements = np.concatenate([load.elements for load in self.loads])
         self.ramps = tuple(ramp for load in self.loads for ramp in load.ramps)
@@ -103,3 +135,18 @@ class Together(NodalLoads):
         for load in self.loads:
             load.weigh(gamma)
         self._add()
+
+    # --- parts of a body ---
+    def of_part(self, part: Selection) -> Self:
+        """What a part of the body has of each of them."""
+        own = copy(self)
+        own.loads = tuple(load.of_part(part) for load in self.loads)
+        del own.nodes, own.values, own.elements
+        return own
+
+    def on(self, space: Space) -> None:
+        """Act on the `space` of the part."""
+        super().on(space)
+        for load in self.loads:
+            load.on(space)
+        self._join(space.n_nodes)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from ..errors import ParameterError, require
+from ..fem.selection import Selection
 from .grips import Grip, Ramp
 
 __all__ = ["Rotation", "Turn"]
@@ -85,6 +87,14 @@ class Turn:
         self.radius = float(np.linalg.norm(self._cos, axis=1).max())
         if not self.radius > 0.0:
             raise ParameterError(f"grip {grip.boundary} turns nothing: all nodes of its boundary are on the axis")
+
+    def of_part(self, part: Selection) -> Turn:
+        """The motion of the nodes that a part of the body has."""
+        own, here = copy(self), part.node[self.nodes]
+        mine = here >= 0
+        own.nodes, own._along = here[mine], self._along[mine]
+        own._cos, own._sin = self._cos[mine], self._sin[mine]
+        return own
 
     def rate(self, t: float) -> float:
         """Rate of the angle from load time `t` up to the next knot [rad/s]."""

@@ -9,6 +9,7 @@ from copy import copy
 import numpy as np
 
 from ..errors import ParameterError, place_text
+from ..fem.selection import Selection
 from ..fem.space import Space
 from .curve import Curve
 from .dead_load import DeadLoad
@@ -126,15 +127,33 @@ class Loading:
         loading.free, loading._steady = loading.free & free, velocity
         return loading
 
-    def of_nodes(self, nodes: np.ndarray) -> Loading:
-        """The same for some `nodes` (m,) of a body, by their numbers among these; of grips that do not turn alone."""
-        part, here = copy(self), np.full(self._shape[0], -1)
-        here[nodes] = np.arange(nodes.size)
-        part._shape = nodes.size, self._shape[1]
-        part.free = np.ascontiguousarray(self.free.reshape(self._shape)[nodes]).ravel()
-        part._moves = [(own[own >= 0], i, value) for held, i, value in self._moves for own in (here[held],)]
-        part._steady = None if self._steady is None else np.ascontiguousarray(self._steady[nodes])
-        return part
+    def of_part(self, part: Selection) -> Loading:
+        """The same for a part of the body, to be put `on` the space of this part.
+
+        Raises
+        ------
+        ParameterError
+            A kind of load does not know parts.
+        """
+        own = copy(self)
+        own._shape = part.nodes.size, self._shape[1]
+        own.free = np.ascontiguousarray(self.free.reshape(self._shape)[part.nodes]).ravel()
+        own._moves = [(here[here >= 0], i, value) for held, i, value in self._moves for here in (part.node[held],)]
+        own._steady = None if self._steady is None else np.ascontiguousarray(self._steady[part.nodes])
+        own.turns = [turn.of_part(part) for turn in self.turns]
+        own.sliding = None if self.sliding is None else self.sliding.of_part(part)
+        own.followers = None if self.followers is None else self.followers.of_part(part)
+        own.dead = None if self.dead is None else self.dead.of_part(part)
+        if self.tractions is not None:  # the first of the dead loads
+            first = own.dead.loads[0] if isinstance(own.dead, Together) else own.dead
+            own.tractions = first if isinstance(first, DeadLoad) else None
+        return own
+
+    def on(self, space: Space) -> None:
+        """Act on the `space` of the part."""
+        for loads in (self.dead, self.followers, self.sliding):
+            if loads is not None:
+                loads.on(space)
 
     def knot(self, t: float) -> float:
         """The next knot after load time `t`, infinity if there is none [s]."""

@@ -11,13 +11,15 @@ stay so. N^T N f is the force of the plane; planes stand still, so that it does 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from copy import copy
 
 import numpy as np
 from scipy.sparse import csr_array
 
 from ..errors import MeshError, ParameterError, place_text
 from ..fem.pattern import Pattern
+from ..fem.selection import Selection
 from ..fem.space import Space
 
 __all__ = ["FLAT", "SlidingPlanes", "normal_of"]
@@ -60,7 +62,8 @@ class SlidingPlanes:
     """What planes oblique to the axes hold of a body.
 
     Memory: how data on a pattern become those of a constrained matrix, which `constrained` keeps for each pattern that
-    it was given; it depends on no earlier call.
+    it was given; it depends on no earlier call. In a part of a body, its space last given to `on`, over which `matrix`
+    is.
 
     Parameters
     ----------
@@ -115,6 +118,28 @@ class SlidingPlanes:
                                  f"{np.degrees(PARALLEL):.2g}): make one plane of them, or leave one out")
         rows.append(left / length)
 
+    # --- parts of a body ---
+    def of_part(self, part: Selection) -> SlidingPlanes:
+        """The nodes that a part of the body has, to be put `on` the space of this part."""
+        own, here = copy(self), part.node[self.nodes]
+        mine = here >= 0
+        own.nodes, own.normals, own._free = here[mine], self.normals[mine], self._free[part.nodes]
+        own._across, own._along, own._maps = self._across[mine], self._along[mine], {}
+        del own.space
+        return own
+
+    def on(self, space: Space) -> None:
+        """Hold the nodes of the `space` of the part."""
+        self.space = space
+
+    def _whole(self, x: np.ndarray) -> np.ndarray:
+        """Shares (k, dim) at the nodes that slide, made whole."""
+        everywhere = np.zeros((self.space.n_nodes, self.space.dim))
+        everywhere[self.nodes] = x
+        whole: np.ndarray = self.space.exchange.whole(everywhere)[self.nodes]
+        return whole
+
+    # --- vectors and matrices ---
     def along(self, x: np.ndarray) -> np.ndarray:
         """P x: vectors at nodes (n, dim) without their parts along the normals."""
         y = x.copy()
@@ -139,7 +164,8 @@ class SlidingPlanes:
     def constrained(self, pattern: Pattern, data: np.ndarray) -> np.ndarray:
         """Data of P A P + s N^T N for a symmetric matrix A with `data` on a pattern over the free unknowns.
 
-        s is the least entry of the diagonal of A at the node, which adds no eigenvalue beyond those of A.
+        s is the least entry of the diagonal of A at the node, which adds no eigenvalue beyond those of A. In a part of
+        a body data are its shares.
         """
         if id(pattern) not in self._maps:
             self._maps[id(pattern)] = pattern, self._map(pattern)
@@ -167,27 +193,31 @@ class SlidingPlanes:
                 if pattern.upper:
                     p, q = np.minimum(p, q), np.maximum(p, q)
                 to.append(there)
-                of.append(np.asarray(numbers[p, q]).ravel() - 1)
+                of.append(np.asarray(numbers[p, q]).ravel() - 1 if p.size else p)  # a sparse array is what is empty
                 weights.append(weight[there])
         turn = csr_array((np.concatenate(weights), (np.concatenate(to), np.concatenate(of))),
                          shape=(entries.size, pattern.nnz))
         own = np.flatnonzero(a == b)
         diagonals = np.where(self._free[self.nodes], pattern.diagonal[number.reshape(n, dim)[self.nodes]], -1)
-        return _Map(entries, turn, own, place[a[own]], self._across[place[a[own]], i[own], j[own]], diagonals)
+        counted = self.space.exchange.counts(n)[a[own]]
+        across = self._across[place[a[own]], i[own], j[own]] * counted
+        return _Map(entries, turn, own, place[a[own]], across, diagonals, self._whole)
 
 
 class _Map:
     """Entries of a matrix that change, what they become of the data, and where s N^T N is added."""
 
     def __init__(self, entries: np.ndarray, turn: csr_array, own: np.ndarray, owner: np.ndarray, across: np.ndarray,
-                 diagonals: np.ndarray) -> None:
+                 diagonals: np.ndarray, whole: Callable[[np.ndarray], np.ndarray]) -> None:
+        self._whole = whole
         self._entries, self._turn, self._own, self._owner = entries, turn, own, owner
         self._across, self._diagonals = across, diagonals
 
     def of(self, data: np.ndarray) -> np.ndarray:
         new, there = data.copy(), self._diagonals >= 0
         turned = self._turn @ data
-        least = np.where(there, np.abs(data[self._diagonals]), np.inf).min(axis=1)
+        diagonal = self._whole(np.where(there, data[self._diagonals], 0.0))
+        least = np.where(there, np.abs(diagonal), np.inf).min(axis=1)
         turned[self._own] += least[self._owner] * self._across
         new[self._entries] = turned
         return new

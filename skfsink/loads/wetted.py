@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -10,6 +11,7 @@ from scipy.sparse.csgraph import connected_components
 
 from ..errors import MeshError, ParameterError
 from ..fem.facets import Facets, boundary_facets, facets_of
+from ..fem.selection import Selection
 from ..fem.space import Space
 
 __all__ = ["WettedSurface"]
@@ -18,7 +20,8 @@ __all__ = ["WettedSurface"]
 class WettedSurface:
     """Facets that several loads act on.
 
-    Memory: the facets, and `area` of them, are of the density last given to `keep`.
+    Memory: the facets, and `area` of them, are of the density last given to `keep`; in a part of a body on its space
+    last given to `on`. `of_part` is of the undamaged facets.
 
     Parameters
     ----------
@@ -62,7 +65,32 @@ class WettedSurface:
         self.boundary = facets_of(space, everywhere)
         self.bears = np.ones(everywhere.size, bool)
         self._gone = np.zeros(0, np.int64)  # elements without force, at the last `keep`
+        none = np.zeros(0, np.int64)
+        self._between, self._between_numbers = facets_of(space, none), none  # sides that part this one from others
         self._take(self.boundary, self.boundary_owner)
+
+    # --- parts of a body ---
+    def of_part(self, part: Selection) -> WettedSurface:
+        """The undamaged facets of a part of the body, to be put `on` the space of this part."""
+        own = copy(self)
+        mine = part.element[self.boundary.elements] >= 0
+        own.boundary, own.boundary_owner = _in_part(self.boundary.some(mine), part), self.boundary_owner[mine]
+        own.bears, own._gone = np.ones(own.boundary_owner.size, bool), np.zeros(0, np.int64)
+        if self._cracks:
+            sides = self.space.mesh.f2t
+            here = (part.element[sides] >= 0) & (sides >= 0)
+            own._between_numbers = np.flatnonzero((sides[1] >= 0) & (here.sum(axis=0) == 1))
+            side = here[1, own._between_numbers].astype(int)
+            own._between = _in_part(facets_of(self.space, own._between_numbers, side), part)
+        del own.space, own.facets, own.owner, own.nodes, own.corner, own.X
+        return own
+
+    def on(self, space: Space) -> None:
+        """Lie on the `space` of the part."""
+        self.space = space
+        self._take(self.boundary, self.boundary_owner)
+
+    # --- the surface at a density ---
 
     def keep(self, gamma: np.ndarray, deleted: np.ndarray, floor: float) -> bool:
         """Let loads act where elements bear force; returns whether these are others than before.
@@ -73,7 +101,7 @@ class WettedSurface:
         conn, N = self.space.conn, self.space.N
         near = np.union1d(self._at(np.flatnonzero(gamma < floor)), np.flatnonzero(deleted))
         gone = near[deleted[near] | (gamma[conn[near]] @ N.T < floor).all(axis=1)]
-        if np.array_equal(gone, self._gone):
+        if self.space.exchange.greatest(float(not np.array_equal(gone, self._gone))) == 0.0:
             return False
         self._gone = gone
         mask = np.zeros(self.space.n_elements, bool)
@@ -106,11 +134,21 @@ class WettedSurface:
         inner = np.flatnonzero(mesh.f2t[1] >= 0)
         one, other = mesh.f2t[:, inner]
         both = gone[one] & gone[other]
-        graph = coo_array((np.ones(int(both.sum()), bool), (one[both], other[both])), shape=(gone.size,) * 2)
-        _, label = connected_components(graph, directed=False)
-        reached = gone & np.isin(label, label[at[gone[at]]])
-        return Facets.joined([facets_of(self.space, inner[reached[out] & ~gone[here]], side)
-                              for side, (here, out) in enumerate(((one, other), (other, one)))])
+        number = np.cumsum(gone) - 1  # of those that are gone
+        size = int(gone.sum())
+        graph = coo_array((np.ones(int(both.sum()), bool), (number[one[both]], number[other[both]])), shape=(size,) * 2)
+        count, label = connected_components(graph, directed=False)
+        exchange, between = self.space.exchange, self._between.elements
+        open_here = gone[between]
+        piece, pieces = exchange.joined(self._between_numbers[open_here], label[number[between[open_here]]], count)
+        label = piece[label]
+        begins = exchange.sums(np.bincount(label[number[at[gone[at]]]], minlength=pieces)) > 0.0
+        reached = np.zeros(gone.size, bool)
+        reached[gone] = begins[label]
+        beyond = np.isin(self._between_numbers, exchange.all(self._between_numbers[reached[between]]))
+        return Facets.joined([*(facets_of(self.space, inner[reached[out] & ~gone[here]], side)
+                                for side, (here, out) in enumerate(((one, other), (other, one)))),
+                              self._between.some(beyond & ~open_here)])
 
     def area(self, u: np.ndarray) -> np.ndarray:
         """Areas of the facets, deformed by `u` (n, dim), (f,) [mm^2; mm in 2D]."""
@@ -121,3 +159,8 @@ class WettedSurface:
         one, two = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), np.cross(x[:, 2] - x[:, 3], x[:, 1] - x[:, 3])
         area: np.ndarray = 0.5 * (np.linalg.norm(one, axis=1) + np.linalg.norm(two, axis=1))
         return area
+
+
+def _in_part(facets: Facets, part: Selection) -> Facets:
+    """Facets by the numbers of their elements and nodes in a part."""
+    return Facets(part.element[facets.elements], facets.local, part.node[facets.nodes])

@@ -17,23 +17,20 @@ for _name in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 
 import json
 import logging
-import shutil
-import subprocess
-import sys
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import meshio
 import numpy as np
 from cyclopts import Parameter
 
-from ..errors import ParameterError, SkfsinkError
 from ..run.display import Display
 from ..system.files import write_atomic
 from .chart import page
 from .part import Part, Planned, Points
+from .ranks_scenes import SCENES, on_ranks
 from .speed_accuracy import run_parts
 from .store import Store
 
@@ -96,21 +93,13 @@ class _Event:
     count: int
 
     def __call__(self) -> dict[str, Any]:
-        mpiexec = shutil.which("mpiexec", path=os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]]))
-        if mpiexec is None:
-            raise ParameterError("no mpiexec: install skfsink with its extra mpi")
         with tempfile.TemporaryDirectory() as name:
             folder, mesh = Path(name), block(self.elements)
             meshio.write(folder / "block.vtu", mesh)
             step = 0.5 * H / 600e3  # s, of the waves of 590 m/s
             write_atomic(folder / "scene.toml", DECK.format(time=STEPS * step, record=STEPS * step / 10))
-            words = [sys.executable, *(["-m", "skfsink.methods.ranks"] if self.count > 1 else []), EVENT, str(folder)]
-            done = subprocess.run([*([mpiexec, "-n", str(self.count)] if self.count > 1 else []), *words],
-                                  capture_output=True, text=True, check=False)
-            if done.returncode:
-                raise SkfsinkError(f"the event of {self.elements} elements on {self.count} ranks ended: "
-                                   f"{(done.stderr.strip().splitlines() or ['no message'])[-1]}")
-            found = json.loads(done.stdout.strip().splitlines()[-1])
+            words = [*(["-m", "skfsink.methods.ranks"] if self.count > 1 else []), EVENT, str(folder)]
+            found = json.loads(on_ranks(self.count, words).strip().splitlines()[-1])
         cost = found["cost"]
         told = cost.get("ranks", {"peak_rss_mb": [cost["peak_rss_mb"]], "halos": 0, "sums": 0, "gamma_iterations": 0})
         return {"elements": found["elements"], "ranks": self.count, "steps": cost["steps"], "step_s": found["step_s"],
@@ -234,14 +223,18 @@ def table(points: Points) -> list[str]:
 
 
 RANKS = Part("scaling", plan, draw, table)
+PARTS = {"scaling": RANKS, "scenes": SCENES}
 
 
-def ranks(*, quick: Annotated[bool, FLAG] = False, fresh: Annotated[bool, FLAG] = False,
-          out: Path = Path("results/study/ranks"), quiet: Annotated[bool, FLAG] = False) -> None:
-    """Measure how an explicit event scales with the ranks of MPI.
+def ranks(*, only: Literal["scaling", "scenes"] | None = None, quick: Annotated[bool, FLAG] = False,
+          fresh: Annotated[bool, FLAG] = False, out: Path = Path("results/study/ranks"),
+          quiet: Annotated[bool, FLAG] = False) -> None:
+    """Measure how an explicit event scales with the ranks of MPI, and hold the scenes on two ranks against one.
 
     Parameters
     ----------
+    only
+        The scaling, or the scenes, alone.
     quick
         A small body on one and two ranks, in a minute.
     fresh
@@ -254,7 +247,7 @@ def ranks(*, quick: Annotated[bool, FLAG] = False, fresh: Annotated[bool, FLAG] 
     logging.getLogger("skfsink").setLevel(logging.ERROR)
     store = Store(out / "ranks.json", "ranks", fresh)
     with Display(quiet) as display:
-        run_parts(store, [RANKS], quick, display)
+        run_parts(store, [PARTS[only]] if only else list(PARTS.values()), quick, display)
 
 
 if __name__ == "__main__":

@@ -35,7 +35,7 @@ UNEXPECTED = 1  # exit status of a program that ends by a mistake of its own
 GIVEN, DONE, COLLECTED = ("take", "begin", "restore"), ("step", "sync", "share"), ("new_deletions", "memory", "peak")
 TASKS = (*GIVEN, *DONE, *COLLECTED, "gather", "end")
 #: fields that can be gathered
-FIELDS = (*NODAL, *ELEMENTAL, "reaction")
+FIELDS = (*NODAL, *ELEMENTAL, "reaction", "kept_volume")
 
 
 def lead(comm: MPI.Intracomm, program: Callable[[], object]) -> NoReturn:
@@ -99,8 +99,10 @@ class Member:
         return self.explicit.step_share(self.state)
 
     def field(self, name: str) -> np.ndarray | None:
-        """What counts here of a field: of the nodes, or of the elements."""
+        """What counts here of a field: of the nodes, or of the elements, or of facets that pressures act on."""
         assert self.part is not None
+        if name == "kept_volume":
+            return self.body.momentum.memory().get(name)
         if name == "reaction":
             return self.explicit.reaction[:self.part.numbers.counted]
         value: np.ndarray | None = getattr(self.state, name)
@@ -125,7 +127,8 @@ class Member:
 class Crew:
     """All ranks, as the first of them leads them, or another one serves.
 
-    Memory: the part of this rank, and the `numbers` of all: after `take`, `begin`, `restore` and `gather` are of them.
+    Memory: the part of this rank, and the `numbers` and `facets` of all: after `take`, `begin`, `restore` and `gather`
+    are of them.
 
     Parameters
     ----------
@@ -159,6 +162,8 @@ class Crew:
     def take(self, parts: list[PartOfBody]) -> None:
         """Give every rank its part."""
         self.numbers = [part.numbers for part in parts]
+        followers = [part.loading.followers for part in parts]
+        self.facets = [np.zeros(0, np.int64) if loads is None else loads.places for loads in followers]
         self._give("take", [(part,) for part in parts])
 
     def begin(self, state: State) -> None:
@@ -200,7 +205,8 @@ class Crew:
         assert parts is not None
         if parts[0] is None:
             return None
-        places = [n.elements if name in ELEMENTAL else n.nodes[:n.counted] for n in self.numbers]
+        places = (self.facets if name == "kept_volume" else
+                  [n.elements if name in ELEMENTAL else n.nodes[:n.counted] for n in self.numbers])
         whole: np.ndarray = np.empty((sum(place.size for place in places), *parts[0].shape[1:]), parts[0].dtype)
         for place, values in zip(places, parts):
             whole[place] = values

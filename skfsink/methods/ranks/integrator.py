@@ -45,7 +45,7 @@ def refuse(scene: BodyScene, analysis: str, integrator: str) -> None:
     comm = world()
     if comm is not None and analysis != "quasistatic" and integrator == "explicit":
         check_ranks(comm.size, scene.space.n_elements)
-        check_parts(scene.loading(), scene.controls)
+        check_parts(scene.space, scene.loading(), scene.controls)
 
 
 class InParts:
@@ -149,6 +149,9 @@ class InParts:
         value = self.crew.gather(name)
         if name == "u" and self._state is not None and value is not None:  # for those who look at stresses and energies
             momentum = self.body.momentum
+            momentum.set_time(self._state.grip)
+            if (kept := self.crew.gather("kept_volume")) is not None:  # below what has failed, which the parts know
+                momentum.restore({**momentum.memory(), "kept_volume": kept})
             momentum.set_gamma(self._state.gamma, self._state.deleted)
             momentum.force(value)
         return value
@@ -164,6 +167,10 @@ class InParts:
         whole = {name: value for name, value in first.items() if name != "numbers"} | {"mode": mode}
         for name in NODAL.intersection(first):
             whole[name] = self._whole(name, memories)
+        if "kept_volume" in first:
+            volume = np.concatenate([memory["kept_volume"] for memory in memories])
+            whole["kept_volume"] = np.empty_like(volume)
+            whole["kept_volume"][np.concatenate(self.crew.facets)] = volume
         return whole
 
     def _whole(self, name: str, memories: list[dict[str, np.ndarray]]) -> np.ndarray:
@@ -177,12 +184,15 @@ class InParts:
         dim, free = self.body.space.dim, self.body.free
         number = np.cumsum(free) - 1
         memories = []
-        for part in self.crew.numbers:
+        for part, facets in zip(self.crew.numbers, self.crew.facets):
             dofs = (part.nodes[:, None] * dim + np.arange(dim)).ravel()
             own = number[dofs[free[dofs]]]
             memories.append({**memory, "mode": memory["mode"][own]})
             for name in NODAL.intersection(memory):
                 memories[-1][name] = memory[name][part.nodes]
+            if "kept_volume" in memory:
+                memories[-1]["kept_volume"] = memory["kept_volume"][facets]
+        self.body.momentum.restore(memory)
         self.body.take(state)
         self.crew.restore(state, memories)
         self._renew(state, False)

@@ -150,13 +150,18 @@ class MPIExchange:
 
     def same(self, pieces: np.ndarray, count: int, holds: np.ndarray) -> tuple[np.ndarray, int]:
         """One number in the whole body for each of the `count` pieces of this part, and how many there are in it."""
+        nodes = self._between[holds[self._between]]
+        return self.joined(self.part.nodes[nodes], pieces[nodes], count)
+
+    def joined(self, places: np.ndarray, pieces: np.ndarray, count: int) -> tuple[np.ndarray, int]:
+        """The same for pieces (m,) of this part at places (m,), by numbers that all parts give them: one at each place.
+        """
         counts = np.array(self.comm.allgather(count))
         first = np.concatenate([[0], np.cumsum(counts)])
-        nodes = self._between[holds[self._between]]
-        links = self.all(np.column_stack([self.part.nodes[nodes], first[self.comm.rank] + pieces[nodes]]))
-        total, places = int(first[-1]), np.unique(links[:, 0], return_inverse=True)[1]
-        size = total + int(places.max(initial=-1)) + 1
-        graph = coo_array((np.ones(len(links)), (links[:, 1], total + places)), shape=(size, size))
+        links = self.all(np.column_stack([places, first[self.comm.rank] + pieces]))
+        total, place = int(first[-1]), np.unique(links[:, 0], return_inverse=True)[1]
+        size = total + int(place.max(initial=-1)) + 1
+        graph = coo_array((np.ones(len(links)), (links[:, 1], total + place)), shape=(size, size))
         label = connected_components(graph, directed=False)[1]
         names, number = np.unique(label[:total], return_inverse=True)
         return number[first[self.comm.rank]:first[self.comm.rank] + count], names.size

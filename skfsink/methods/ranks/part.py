@@ -11,6 +11,7 @@ import skfem
 
 from ...errors import ParameterError
 from ...fem.backend import BulkViscosity
+from ...fem.selection import Selection
 from ...fem.space import Space
 from ...fields.body import Body, BodyControls
 from ...fields.density import DensitySolver
@@ -58,19 +59,21 @@ class PartOfBody:
     def body(self, comm: MPI.Intracomm) -> Body:
         """The part as a body whose balances tell the others what they have to."""
         space = Space(self.mesh, self.axisymmetric, MPIExchange(comm, self.numbers, self.n_nodes))
-        momentum = Momentum(space, self.material, regions=self.regions, **self.momentum)
+        self.loading.on(space)
+        momentum = Momentum(space, self.material, regions=self.regions, dead=self.loading.dead,
+                            followers=self.loading.followers, **self.momentum)
         density = DensitySolver(space, self.sink_law, regions=self.regions, solver="jacobi", **self.density)
         return Body(momentum, density, self.loading, self.deletion)
 
 
-def check_parts(loading: Loading, controls: BodyControls) -> None:
+def check_parts(space: Space, loading: Loading, controls: BodyControls) -> None:
     """Refuse what parts of a body do not know (ParameterError)."""
-    what = ("contact" if controls.contact else "pressures and fillings" if loading.followers is not None
-            else "dead loads" if loading.dead is not None else "planes of an oblique direction" if loading.sliding
-            is not None else "grips that turn" if loading.turns else "kernels forms" if controls.kernels != "compiled"
+    what = ("contact" if controls.contact else "kernels forms" if controls.kernels != "compiled"
             else "the consistent sink" if controls.sink == "consistent" else "")
     if what:
         raise ParameterError(f"several ranks do not know {what}: start it on one rank")
+    none = np.zeros(0, np.int64)
+    loading.of_part(Selection(none, none, space.n_elements, space.n_nodes))
 
 
 def parts_of(body: Body, controls: ExplicitControls, ranks: int) -> list[PartOfBody]:
@@ -84,10 +87,9 @@ def parts_of(body: Body, controls: ExplicitControls, ranks: int) -> list[PartOfB
     space, momentum, density = body.space, body.momentum, body.density
     found = []
     for part in numbers(space.conn, partition(space.conn, ranks)):
-        here = np.full(space.n_nodes, -1)
-        here[part.nodes] = np.arange(part.nodes.size)
+        selection = Selection(part.elements, part.nodes, space.n_elements, space.n_nodes)
         mesh = type(space.mesh)(np.ascontiguousarray(space.X[part.nodes].T),
-                                np.ascontiguousarray(here[space.mesh.t[:, part.elements]]))
+                                np.ascontiguousarray(selection.node[space.mesh.t[:, part.elements]]))
         absent = np.flatnonzero(np.isin(part.elements, density.absent))
         found.append(PartOfBody(
             part, space.n_nodes, mesh, space.axisymmetric, momentum.material, density.law,
@@ -96,7 +98,7 @@ def parts_of(body: Body, controls: ExplicitControls, ranks: int) -> list[PartOfB
              "bulk_viscosity": BulkViscosity(*momentum.bulk_viscosity)},
             {"sink": density.sink, "unchanged": density.unchanged, "gradient": density.gradient, "absent": absent,
              "active_zone": density.zone is not None},
-            body.loading.of_nodes(part.nodes), body.deletion, controls))
+            body.loading.of_part(selection), body.deletion, controls))
     return found
 
 

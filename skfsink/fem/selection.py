@@ -1,0 +1,42 @@
+"""Which elements and nodes of a body a part of it has."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+__all__ = ["Selection"]
+
+
+@dataclass(frozen=True, eq=False)
+class Selection:
+    """Some elements of a body and their nodes, in the order in which a part of it has them.
+
+    Parameters
+    ----------
+    elements, nodes: their numbers in the whole body, (m,) and (k,).
+    n_elements, n_nodes: of the whole body.
+    """
+
+    elements: np.ndarray
+    nodes: np.ndarray
+    n_elements: int
+    n_nodes: int
+
+    @cached_property
+    def element(self) -> np.ndarray:
+        """Number in the part of each element of the body, (n_elements,); -1 of those it does not have."""
+        return _here(self.elements, self.n_elements)
+
+    @cached_property
+    def node(self) -> np.ndarray:
+        """Number in the part of each node of the body, (n_nodes,); -1 of those it does not have."""
+        return _here(self.nodes, self.n_nodes)
+
+
+def _here(numbers: np.ndarray, count: int) -> np.ndarray:
+    here = np.full(count, -1)
+    here[numbers] = np.arange(numbers.size)
+    return here
