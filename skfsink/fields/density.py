@@ -105,8 +105,7 @@ class DensitySolver:
         self.phi = phi[:, None] if isinstance(phi, np.ndarray) else phi
         self.failure_energy = by_element(ne, law.failure_energy, regions, lambda region: region.sink_law.failure_energy)
         self.pattern, self.absent = Pattern(space), np.zeros(0, np.int64) if absent is None else absent
-        self._assembled = Pattern(space) if self.absent.size else self.pattern
-        self._assembled.slot[self.absent] = -1
+        self._assembled = Pattern(space, absent=self.absent) if self.absent.size else self.pattern
         self.backend = backend(kernels).density(space, law.length_scale)
         self.load = self._lump(np.ones_like(space.w))
         self._bounded = self._quadrature.monotone and gradient == "monotone"
