@@ -140,7 +140,7 @@ def main() -> None:
         body = whole_body(dim, rings)
         state = stretched(body)
         member = Member(COMM)
-        member.take(parts_of(body, ExplicitControls(), COMM.size)[COMM.rank])
+        member.take(list(parts_of(body, ExplicitControls(), COMM.size))[COMM.rank])
         check_sums(body, state, member)
         check_debris(body, member)
         check_event(body, state, member)

@@ -71,7 +71,7 @@ class Tiles:
     def __init__(self, space: Space, plane_stress: bool = False, threads: int = 1,
                  parts: Sequence[tuple[np.ndarray | None, np.ndarray | None]] = ((None, None),)) -> None:
         self.space = space
-        ne, na, dim = space.n_elements, space.conn.shape[1], space.dim
+        na, dim = space.conn.shape[1], space.dim
         self.lanes = LANES if dim == 2 else LANES_3D
         ends = self._arrange([elements for elements, _ in parts])
         self.conn, self.geometry = self.tile(space.nodes), self._geometry()

@@ -11,7 +11,7 @@ import os
 import signal
 import sys
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -19,10 +19,12 @@ import numpy as np
 
 from ...errors import SkfsinkError
 from ...fields.state import State
+from ...fields.stress import cauchy_stress
 from ...system.peak import peak_rss_mb
 from ..explicit import Explicit
 from .mpi import MPIExchange, wait
 from .part import ELEMENTAL, NODAL, PartOfBody, state_of
+from .partition import Numbers
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -34,8 +36,9 @@ UNEXPECTED = 1  # exit status of a program that ends by a mistake of its own
 #: what the first rank asks of all: to take something that it gives, to do something, to give something back
 GIVEN, DONE, COLLECTED = ("take", "begin", "restore"), ("step", "sync", "share"), ("new_deletions", "memory", "peak")
 TASKS = (*GIVEN, *DONE, *COLLECTED, "gather", "end")
+EVALUATED = ("W", "points", "stress")   # at the last force, of the elements: W, gamma at Gauss points, Cauchy stress
 #: fields that can be gathered
-FIELDS = (*NODAL, *ELEMENTAL, "reaction")
+FIELDS = (*NODAL, *ELEMENTAL, *EVALUATED, "reaction")
 
 
 def lead(comm: MPI.Intracomm, program: Callable[[], object]) -> NoReturn:
@@ -103,6 +106,10 @@ class Member:
         assert self.part is not None
         if name == "reaction":
             return self.explicit.reaction[:self.part.numbers.counted]
+        if name in EVALUATED:
+            momentum = self.body.momentum
+            return (momentum.W if name == "W" else momentum.gamma if name == "points" else
+                    cauchy_stress(momentum, self.state.u))
         value: np.ndarray | None = getattr(self.state, name)
         return value if value is None or name in ELEMENTAL else value[:self.part.numbers.counted]
 
@@ -144,9 +151,14 @@ class Crew:
     def _ask(self, task: str, detail: int = 0) -> None:
         wait(self.comm.Ibcast(np.array([TASKS.index(task), detail], np.int64)))
 
-    def _give(self, task: str, items: Sequence[tuple[Any, ...]]) -> None:
+    def _give(self, task: str, items: Iterable[tuple[Any, ...]]) -> None:
+        """Items are made, sent and forgotten one by one: all of them may be as large as the body."""
+        items = iter(items)
+        own = next(items)  # what cannot be made is told before the others wait for it
         self._ask(task)
-        getattr(self.member, task)(*self.comm.scatter(items))
+        for rank, item in enumerate(items, 1):
+            self.comm.send(item, rank)
+        getattr(self.member, task)(*own)
 
     def _do(self, task: str) -> Any:
         self._ask(task)
@@ -156,18 +168,24 @@ class Crew:
         self._ask(task)
         return self.comm.gather(getattr(self.member, task)()) or []
 
-    def take(self, parts: list[PartOfBody]) -> None:
+    def take(self, parts: Iterable[PartOfBody]) -> None:
         """Give every rank its part."""
-        self.numbers = [part.numbers for part in parts]
-        self._give("take", [(part,) for part in parts])
+        self.numbers: list[Numbers] = []
+
+        def each() -> Iterator[tuple[PartOfBody]]:
+            for part in parts:
+                self.numbers.append(part.numbers)
+                yield (part,)
+
+        self._give("take", each())
 
     def begin(self, state: State) -> None:
         """Set the body in motion from a state of the whole."""
-        self._give("begin", [(state_of(state, part),) for part in self.numbers])
+        self._give("begin", ((state_of(state, part),) for part in self.numbers))
 
     def restore(self, state: State, memories: list[dict[str, np.ndarray]]) -> None:
         """Go on from a state of the whole, and what the integrator of each part remembers."""
-        self._give("restore", [(state_of(state, part), memory) for part, memory in zip(self.numbers, memories)])
+        self._give("restore", ((state_of(state, part), memory) for part, memory in zip(self.numbers, memories)))
 
     def step(self) -> None:
         """One step of all."""
@@ -196,13 +214,15 @@ class Crew:
     def gather(self, name: str) -> np.ndarray | None:
         """A field of the whole body, one of :data:`FIELDS`."""
         self._ask("gather", FIELDS.index(name))
-        parts = self.comm.gather(self.member.field(name))
-        assert parts is not None
-        if parts[0] is None:
+        own = self.member.field(name)
+        if own is None:
             return None
-        places = [n.elements if name in ELEMENTAL else n.nodes[:n.counted] for n in self.numbers]
-        whole: np.ndarray = np.empty((sum(place.size for place in places), *parts[0].shape[1:]), parts[0].dtype)
-        for place, values in zip(places, parts):
+        places = [n.nodes[:n.counted] if name in (*NODAL, "reaction") else n.elements for n in self.numbers]
+        whole: np.ndarray = np.empty((sum(place.size for place in places), *own.shape[1:]), own.dtype)
+        whole[places[0]] = own
+        for rank, place in enumerate(places[1:], 1):
+            values = np.empty((place.size, *own.shape[1:]), own.dtype)
+            wait(self.comm.Irecv(values, rank))
             whole[place] = values
         return whole
 
@@ -235,10 +255,11 @@ class Crew:
     def _serve(self, task: str, detail: int) -> None:
         member, comm = self.member, self.comm
         if task in GIVEN:
-            getattr(member, task)(*comm.scatter(None))
+            getattr(member, task)(*comm.recv(source=0))
         elif task in COLLECTED:
             comm.gather(getattr(member, task)())
         elif task == "gather":
-            comm.gather(member.field(FIELDS[detail]))
+            if (values := member.field(FIELDS[detail])) is not None:
+                wait(comm.Isend(np.ascontiguousarray(values), 0))
         else:
             getattr(member, task)()

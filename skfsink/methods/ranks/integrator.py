@@ -12,6 +12,7 @@ from ...fields.state import State
 from ..controls import EventControls
 from ..integrators import INTEGRATORS, Integrator
 from .crew import Crew
+from .gathered import Gathered
 from .part import check_parts, parts_of
 from .partition import check_ranks
 from .world import world
@@ -48,11 +49,17 @@ def refuse(scene: BodyScene, analysis: str, integrator: str) -> None:
         check_parts(scene.loading(), scene.controls)
 
 
+def _is_light(body: Body) -> bool:
+    """Whether all that is asked of the momentum balance of a body can be fetched from its parts."""
+    momentum = body.momentum
+    return momentum.dead is None and momentum.followers is None and momentum.contact is None
+
+
 class InParts:
     """See :class:`.Integrator` and :class:`.Explicit`.
 
-    What changes in the parts is fetched when it is asked for: fields of the state, the reaction, and with the
-    displacement what the momentum balance of the whole body knows at it.
+    What changes in the parts is fetched when it is asked for: fields of the state, the reaction, stresses, and what the
+    momentum balance of the whole body knows; of this no more is kept than that takes (see :class:`.Gathered`).
 
     Memory: that of all ranks: after `begin` or `restore`, `run`, `sync` and `reaction` are of the state last stepped.
     """
@@ -61,6 +68,8 @@ class InParts:
 
     def __init__(self, body: Body, controls: EventControls, crew: Crew) -> None:
         self.body, self.crew = body, crew
+        self._gathered = Gathered(body.momentum, self._fetch) if _is_light(body) else None
+        body.release()
         crew.take(parts_of(body, controls.explicit, crew.size))
         self._own, self._reaction = crew.member.explicit, np.zeros((0, 0))
         self._state: State | None = None
@@ -97,6 +106,10 @@ class InParts:
     def solves(self) -> int:
         """Solves for gamma in the parts."""
         return self._own.density.solves
+
+    def stress(self) -> np.ndarray:
+        """Mean Cauchy stress of the elements [MPa], (ne, 6), as the parts find it."""
+        return self._fetch("stress")
 
     def cost(self) -> dict[str, Any]:
         """What each rank has used of memory [MB], and how often they have told each other something.
@@ -140,15 +153,19 @@ class InParts:
             new = self.crew.new_deletions()
             state.deletions.extend(new)
             state.deleted[[element for _, element in new]] = True
-        self.body.momentum.least_J = self.crew.member.body.momentum.least_J
+        whole, part_momentum = self.body.momentum, self.crew.member.body.momentum
+        whole.least_J = part_momentum.least_J
         self._reaction, self._state = np.zeros((0, 0)), state
+        if self._gathered is not None:
+            whole.energy = part_momentum.energy
+            self._gathered.now(state)
 
     def _fetch(self, name: str) -> Any:
         if name == "W_max":
             self.crew.sync()
         value = self.crew.gather(name)
-        if name == "u" and self._state is not None and value is not None:  # for those who look at stresses and energies
-            momentum = self.body.momentum
+        if name == "u" and self._gathered is None and self._state is not None and value is not None:
+            momentum = self.body.momentum  # for those who look at stresses and energies
             momentum.set_gamma(self._state.gamma, self._state.deleted)
             momentum.force(value)
         return value
@@ -183,6 +200,7 @@ class InParts:
             memories.append({**memory, "mode": memory["mode"][own]})
             for name in NODAL.intersection(memory):
                 memories[-1][name] = memory[name][part.nodes]
-        self.body.take(state)
+        if self._gathered is None:
+            self.body.take(state)
         self.crew.restore(state, memories)
         self._renew(state, False)

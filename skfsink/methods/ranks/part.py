@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -73,8 +73,8 @@ def check_parts(loading: Loading, controls: BodyControls) -> None:
         raise ParameterError(f"several ranks do not know {what}: start it on one rank")
 
 
-def parts_of(body: Body, controls: ExplicitControls, ranks: int) -> list[PartOfBody]:
-    """The parts of a body, one for each rank.
+def parts_of(body: Body, controls: ExplicitControls, ranks: int) -> Iterator[PartOfBody]:
+    """The parts of a body, one for each rank, made as they are asked for.
 
     Raises
     ------
@@ -82,22 +82,20 @@ def parts_of(body: Body, controls: ExplicitControls, ranks: int) -> list[PartOfB
         There are more ranks than elements.
     """
     space, momentum, density = body.space, body.momentum, body.density
-    found = []
     for part in numbers(space.conn, partition(space.conn, ranks)):
         here = np.full(space.n_nodes, -1)
         here[part.nodes] = np.arange(part.nodes.size)
         mesh = type(space.mesh)(np.ascontiguousarray(space.X[part.nodes].T),
                                 np.ascontiguousarray(here[space.mesh.t[:, part.elements]]))
         absent = np.flatnonzero(np.isin(part.elements, density.absent))
-        found.append(PartOfBody(
+        yield PartOfBody(
             part, space.n_nodes, mesh, space.axisymmetric, momentum.material, density.law,
             _regions(body, part.elements),
             {"element": momentum.element, "force_floor": momentum.force_floor,
              "bulk_viscosity": BulkViscosity(*momentum.bulk_viscosity)},
             {"sink": density.sink, "unchanged": density.unchanged, "gradient": density.gradient, "absent": absent,
-             "active_zone": density.zone is not None},
-            body.loading.of_nodes(part.nodes), body.deletion, controls))
-    return found
+             "active_zone": density.active_zone},
+            body.loading.of_nodes(part.nodes), body.deletion, controls)
 
 
 def _regions(body: Body, elements: np.ndarray) -> tuple[Region, ...]:

@@ -14,6 +14,7 @@ from ...fields.crack import CrackTracker, Tips
 from ...fields.state import State
 from ...fields.stress import cauchy_stress
 from ...methods.integrators import Integrator
+from ...methods.ranks.integrator import InParts
 from ...scene.scene import Scene
 from .gauge import Gauge
 
@@ -109,7 +110,9 @@ class View:
     def stress(self) -> np.ndarray:
         """Mean Cauchy stress of the elements [MPa], (ne, 6); see :func:`.cauchy_stress`."""
         if self._stress is None:
-            self._stress = cauchy_stress(self.body.momentum, self.state.u)
+            parts = self.integrator
+            self._stress = parts.stress() if isinstance(parts, InParts) else cauchy_stress(self.body.momentum,
+                                                                                           self.state.u)
         return self._stress
 
     @property
