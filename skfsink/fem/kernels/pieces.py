@@ -12,7 +12,7 @@ from .records import Piece
 
 __all__ = ["pieces"]
 
-PIECE = 4096  # elements whose data is made at a time
+PIECE = 1024  # elements whose data is made at a time
 
 
 def pieces(space: Space, pattern: Pattern, gamma: np.ndarray, elements: np.ndarray | None,

@@ -13,11 +13,11 @@ import sys
 import traceback
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn, TypeVar, cast
 
 import numpy as np
 
-from ...errors import SkfsinkError
+from ...errors import OutputError, ParameterError, SkfsinkError
 from ...fields.state import State
 from ...fields.stress import cauchy_stress
 from ...system.peak import peak_rss_mb
@@ -31,12 +31,14 @@ if TYPE_CHECKING:
 
 __all__ = ["Crew", "Member", "lead"]
 
+T = TypeVar("T")
 IDLE = 1e-3    # s without a task, after which a rank looks for one less often
 UNEXPECTED = 1  # exit status of a program that ends by a mistake of its own
 #: what the first rank asks of all: to take something that it gives, to do something, to give something back
 GIVEN, DONE, COLLECTED = ("take", "begin", "restore"), ("step", "sync", "share"), ("new_deletions", "memory", "peak")
-TASKS = (*GIVEN, *DONE, *COLLECTED, "gather", "end")
-EVALUATED = ("W", "points", "stress")   # at the last force, of the elements: W, gamma at Gauss points, Cauchy stress
+TASKS = (*GIVEN, *DONE, *COLLECTED, "gather", "each", "end")
+#: of the elements, at the last force: W, gamma at Gauss points, Cauchy stress, and whether none is defined
+EVALUATED = ("W", "points", "stress", "crushed")
 #: fields that can be gathered
 FIELDS = (*NODAL, *ELEMENTAL, *EVALUATED, "reaction")
 
@@ -72,12 +74,29 @@ class Member:
         self.part: PartOfBody | None = None
 
     def take(self, part: PartOfBody) -> None:
-        """Take up a part of the body."""
+        """Take up a part of the body; ParameterError on all ranks if one of them cannot read its."""
+        part = self.agreed(lambda: part.read(self.comm.rank), ParameterError)
         self.part, self.body = part, part.body(self.comm)
         self.explicit = Explicit(self.body, part.controls)
         assert isinstance(self.body.space.exchange, MPIExchange)
         self.exchange = self.body.space.exchange
         self.logged = 0
+
+    def agreed(self, does: Callable[[], T], kind: type[SkfsinkError]) -> T:
+        """What `does` returns; what goes wrong on one rank goes wrong on all, as an error of a `kind`."""
+        said, value = "", None
+        try:
+            value = does()
+        except kind as error:
+            said = str(error)
+        if failures := [text for text in self.comm.allgather(said) if text]:
+            raise kind(failures[0])
+        return cast(T, value)
+
+    def each(self, task: tuple[Callable[..., T], tuple[Any, ...]]) -> T:
+        """What a function returns for this rank, and further arguments; OutputError on all if it is one's."""
+        function, arguments = task
+        return self.agreed(lambda: function(self, *arguments), OutputError)
 
     def begin(self, state: State) -> None:
         """Set the part in motion."""
@@ -108,8 +127,10 @@ class Member:
             return self.explicit.reaction[:self.part.numbers.counted]
         if name in EVALUATED:
             momentum = self.body.momentum
-            return (momentum.W if name == "W" else momentum.gamma if name == "points" else
-                    cauchy_stress(momentum, self.state.u))
+            if name in ("W", "points"):
+                return momentum.W if name == "W" else momentum.gamma
+            stress = cauchy_stress(momentum, self.state.u)
+            return stress if name == "stress" else np.isnan(stress).any(axis=1)
         value: np.ndarray | None = getattr(self.state, name)
         return value if value is None or name in ELEMENTAL else value[:self.part.numbers.counted]
 
@@ -226,6 +247,14 @@ class Crew:
             whole[place] = values
         return whole
 
+    def each(self, function: Callable[..., T], *arguments: Any) -> T:
+        """Let every rank call a function that can be imported, with its :class:`Member` and `arguments`.
+
+        Returns what it gave on the first one. OutputError if it was one's.
+        """
+        self._ask("each")
+        return self.member.each(self.comm.bcast((function, arguments)))
+
     def end(self) -> None:
         """Let all others go."""
         self._ask("end")
@@ -258,6 +287,8 @@ class Crew:
             getattr(member, task)(*comm.recv(source=0))
         elif task in COLLECTED:
             comm.gather(getattr(member, task)())
+        elif task == "each":
+            member.each(comm.bcast(None))
         elif task == "gather":
             if (values := member.field(FIELDS[detail])) is not None:
                 wait(comm.Isend(np.ascontiguousarray(values), 0))

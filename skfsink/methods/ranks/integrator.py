@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
+from ...errors import ParameterError
 from ...fields.body import Body, BodyScene
 from ...fields.state import State
 from ..controls import EventControls
@@ -14,21 +16,36 @@ from ..integrators import INTEGRATORS, Integrator
 from .crew import Crew
 from .gathered import Gathered
 from .part import check_parts, parts_of
+from .parted import Parted
 from .partition import check_ranks
 from .world import world
 
-__all__ = ["InParts", "integrator_of", "ranks_text", "refuse"]
+__all__ = ["InParts", "RankOptions", "integrator_of", "ranks_text", "refuse"]
 
+T = TypeVar("T")
 MOVING, DENSITY = ("u", "v", "a", "W_max"), ("gamma", "sink")
 NODAL = {"reaction", "viscous"}  # of the memory of an integrator
 
 
-def integrator_of(name: str, body: Body, controls: EventControls) -> Integrator:
+class RankOptions(NamedTuple):
+    """What a run on several ranks can be asked for.
+
+    Attributes
+    ----------
+    partition: folder with the parts of the body; None cuts it.
+    frame_pieces: whether each rank writes its piece of a frame.
+    """
+
+    partition: Path | None = None
+    frame_pieces: bool = False
+
+
+def integrator_of(name: str, body: Body, controls: EventControls, options: RankOptions = RankOptions()) -> Integrator:  # noqa: B008
     """The integrator of an event: that of a body in parts where there are several ranks, and it has one."""
     comm = world()
     if comm is None or name != "explicit":
         return INTEGRATORS[name].of(body, controls)
-    return InParts(body, controls, Crew(comm))
+    return InParts(body, controls, Crew(comm), options)
 
 
 def ranks_text(analysis: str, integrator: str) -> str:
@@ -41,9 +58,16 @@ def ranks_text(analysis: str, integrator: str) -> str:
     return f"{comm.size} ranks: one computes all of it, the others wait; parts know the explicit event alone"
 
 
-def refuse(scene: BodyScene, analysis: str, integrator: str) -> None:
-    """Refuse an event that the ranks that there are cannot compute, before the body is loaded (ParameterError)."""
+def refuse(scene: BodyScene, analysis: str, integrator: str, parted: Path | None = None) -> None:
+    """Refuse an event that the ranks that there are cannot compute, before the body is loaded (ParameterError).
+
+    The same of parts in a folder that are not those of this mesh for these ranks.
+    """
     comm = world()
+    if parted is not None:
+        if analysis == "quasistatic" or integrator != "explicit":
+            raise ParameterError("a partition is for an explicit event, and this run has none: leave partition out")
+        Parted(parted).check(scene.space, 1 if comm is None else comm.size)
     if comm is not None and analysis != "quasistatic" and integrator == "explicit":
         check_ranks(comm.size, scene.space.n_elements)
         check_parts(scene.loading(), scene.controls)
@@ -66,11 +90,12 @@ class InParts:
 
     factorisations = 0
 
-    def __init__(self, body: Body, controls: EventControls, crew: Crew) -> None:
-        self.body, self.crew = body, crew
+    def __init__(self, body: Body, controls: EventControls, crew: Crew, options: RankOptions = RankOptions()) -> None:  # noqa: B008
+        self.body, self.crew, self.options = body, crew, options
+        parted = None if options.partition is None else Parted(options.partition)
         self._gathered = Gathered(body.momentum, self._fetch) if _is_light(body) else None
         body.release()
-        crew.take(parts_of(body, controls.explicit, crew.size))
+        crew.take(parts_of(body, controls.explicit, crew.size, parted))
         self._own, self._reaction = crew.member.explicit, np.zeros((0, 0))
         self._state: State | None = None
 
@@ -110,6 +135,14 @@ class InParts:
     def stress(self) -> np.ndarray:
         """Mean Cauchy stress of the elements [MPa], (ne, 6), as the parts find it."""
         return self._fetch("stress")
+
+    def crushed(self) -> np.ndarray:
+        """Mask of the elements that no stress is defined for, (ne,)."""
+        return self._fetch("crushed")
+
+    def each(self, function: Callable[..., T], *arguments: Any) -> T:
+        """See :meth:`.Crew.each`."""
+        return self.crew.each(function, *arguments)
 
     def cost(self) -> dict[str, Any]:
         """What each rank has used of memory [MB], and how often they have told each other something.

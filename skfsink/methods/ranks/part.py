@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,7 +21,8 @@ from ...material import Material, SinkLaw
 from ...material.regions import Region
 from ..controls import ExplicitControls
 from .mpi import MPIExchange
-from .partition import Numbers, numbers, partition
+from .parted import Parted
+from .partition import Numbers, mesh_of, numbers, partition
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -38,13 +39,14 @@ class PartOfBody:
 
     Attributes
     ----------
-    mesh: elements and nodes of the part.   n_nodes: of the whole body.
+    mesh: elements and nodes of the part, None of one that is read.   n_nodes: of the whole body.
+    parted: the files it is read from, if it is.
     momentum, density: further arguments of the balances.
     """
 
     numbers: Numbers
     n_nodes: int
-    mesh: skfem.Mesh
+    mesh: skfem.Mesh | None
     axisymmetric: bool
     material: Material
     sink_law: SinkLaw
@@ -54,6 +56,14 @@ class PartOfBody:
     loading: Loading
     deletion: float
     controls: ExplicitControls
+    parted: Parted | None = None
+
+    def read(self, number: int) -> PartOfBody:
+        """With its mesh, as part `number` of the files; ParameterError if they cannot be read."""
+        if self.parted is None:
+            return self
+        own, mesh = self.parted.part(number)
+        return replace(self, numbers=own, mesh=mesh)
 
     def body(self, comm: MPI.Intracomm) -> Body:
         """The part as a body whose balances tell the others what they have to."""
@@ -73,20 +83,19 @@ def check_parts(loading: Loading, controls: BodyControls) -> None:
         raise ParameterError(f"several ranks do not know {what}: start it on one rank")
 
 
-def parts_of(body: Body, controls: ExplicitControls, ranks: int) -> Iterator[PartOfBody]:
-    """The parts of a body, one for each rank, made as they are asked for.
+def parts_of(body: Body, controls: ExplicitControls, ranks: int, parted: Parted | None = None) -> Iterator[PartOfBody]:
+    """The parts of a body, one for each rank, made as they are asked for; of `parted` each rank reads its mesh.
 
     Raises
     ------
     ParameterError
-        There are more ranks than elements.
+        There are more ranks than elements, or a file of a part cannot be read.
     """
     space, momentum, density = body.space, body.momentum, body.density
-    for part in numbers(space.conn, partition(space.conn, ranks)):
-        here = np.full(space.n_nodes, -1)
-        here[part.nodes] = np.arange(part.nodes.size)
-        mesh = type(space.mesh)(np.ascontiguousarray(space.X[part.nodes].T),
-                                np.ascontiguousarray(here[space.mesh.t[:, part.elements]]))
+    made = numbers(space.conn, partition(space.conn, ranks)) if parted is None else []
+    for number in range(ranks):
+        part = made[number] if parted is None else parted.numbers(number)
+        mesh = mesh_of(space, part) if parted is None else None
         absent = np.flatnonzero(np.isin(part.elements, density.absent))
         yield PartOfBody(
             part, space.n_nodes, mesh, space.axisymmetric, momentum.material, density.law,
@@ -95,7 +104,7 @@ def parts_of(body: Body, controls: ExplicitControls, ranks: int) -> Iterator[Par
              "bulk_viscosity": BulkViscosity(*momentum.bulk_viscosity)},
             {"sink": density.sink, "unchanged": density.unchanged, "gradient": density.gradient, "absent": absent,
              "active_zone": density.active_zone},
-            body.loading.of_nodes(part.nodes), body.deletion, controls)
+            body.loading.of_nodes(part.nodes), body.deletion, controls, parted)
 
 
 def _regions(body: Body, elements: np.ndarray) -> tuple[Region, ...]:

@@ -45,6 +45,7 @@ class View:
     moment: what has come with this step: "arrival", "branching", or "".
     on_time: whether the event begins at a load time that was given, before anything fails.
     waiting: whether a body from rest in motion has not cracked yet, which may take thousands of records.
+    framed: whether a frame was written at this moment by the ranks themselves, without the stress of the whole body.
     save: writes a checkpoint.   stop_asked: whether the run was asked to stop.
     """
 
@@ -64,6 +65,7 @@ class View:
     moment: str = ""
     on_time: bool = False
     waiting: bool = False
+    framed: bool = False
     save: Callable[[], None] = lambda: None
     stop_asked: Callable[[], bool] = lambda: False
 
@@ -121,6 +123,15 @@ class View:
         return self._stress is not None
 
     @property
+    def crushed(self) -> np.ndarray:
+        """Mask of the elements that no stress is defined for, (ne,)."""
+        parts = self.integrator
+        if self._stress is None and isinstance(parts, InParts):
+            return parts.crushed()
+        mask: np.ndarray = np.isnan(self.stress).any(axis=1)
+        return mask
+
+    @property
     def step_share(self) -> float:
         """The step over its stability limit at this state; infinite where an integrator has none."""
         return np.inf if self.integrator is None else self.integrator.step_share(self.state)
@@ -131,7 +142,7 @@ class View:
         self.before = state.time if occasion == "begin" else self.now
         self.now = state.time
         self.state, self._reaction, self.occasion, self.dt, self.way = state, reaction, occasion, dt, way
-        self.moment, self._stress = "", None
+        self.moment, self._stress, self.framed = "", None, False
         return self
 
     def crossed_multiple_of(self, every: float) -> bool:
