@@ -110,20 +110,26 @@ def test_matrices_are_made_again() -> None:
 
 
 def test_memory_of_an_explicit_event() -> None:
-    """Fails if a body takes more than 7 kB a hexahedron at its peak, while it is made or stepped; it was 15."""
-    mesh = skfem.MeshHex.init_tensor(*(np.linspace(0.0, 1.0, 19),) * 3)
-    tracemalloc.start()
-    try:
-        space = Space(mesh)
-        free = np.ones(space.X.size, bool)
+    """Fails if a body takes more than 11 kB a hexahedron at its peak, while it is made or stepped: 9 now, 17.5 before.
+
+    1.7 of them are vectors of Lanczos's method, which count before they are written.
+    """
+    def event(n: int) -> int:
+        space = Space(skfem.MeshHex.init_tensor(*(np.linspace(0.0, 1.0, n + 1),) * 3))
         body = Body(Momentum(space, AAA()), DensitySolver(space, SinkLaw(), solver="jacobi"),
-                    Loading.steady(space, free, np.zeros_like(space.X)))
+                    Loading.steady(space, np.ones(space.X.size, bool), np.zeros_like(space.X)))
         explicit, state = Explicit(body, ExplicitControls()), body.begin()
         state.v[:, 0] = 1e3 * space.X[:, 0]
         explicit.begin(state)
         for _ in range(3):
             explicit.step(state)
+        return space.n_elements
+
+    event(2)  # what is compiled is not counted
+    tracemalloc.start()
+    try:
+        count = event(18)
         peak = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
-    assert peak < 7_000 * space.n_elements, peak / space.n_elements
+    assert peak < 11_000 * count, peak / count
