@@ -13,7 +13,7 @@ __all__ = ["main"]
 
 COMMANDS = {"run": "run:run", "list": "cases:list_cases", "show": "show:show", "resume": "resume:resume",
             "sweep": "sweep:sweep", "report": "report:report", "render": "render:render",
-            "material": "material:material", "mesh": "mesh:mesh"}
+            "material": "material:material", "mesh": "mesh:mesh", "partition": "partition:partition"}
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -236,12 +236,12 @@ def check_all(body: Body) -> None:
     """Check the parts of a body."""
     state = stretched(body)
     member = Member(COMM)
-    member.take(parts_of(body, ExplicitControls(), COMM.size)[COMM.rank])
+    member.take(list(parts_of(body, ExplicitControls(), COMM.size))[COMM.rank])
     check_sums(body, state, member)
     check_debris(body, member)
     check_loads(body, state, member)
     body.take(state)
-    member.take(parts_of(body, ExplicitControls(), COMM.size)[COMM.rank])
+    member.take(list(parts_of(body, ExplicitControls(), COMM.size))[COMM.rank])
     check_event(body, state, member)
 
 

@@ -52,7 +52,7 @@ def named(cell: str, other: str) -> Iterator[tuple[str, Any]]:
 def test_the_table_of_options_has_every_option_and_its_default() -> None:
     """Fails if docs/methods.md leaves an option out, has one that is none, or says another default."""
     said = dict(pair for row in rows(METHODS, "| option | default |") for pair in named(row[0], row[1]))
-    assert said.keys() == {*shared_parameters(), "out", "resume", "overwrite", "quiet"}
+    assert said.keys() == {*shared_parameters(), "out", "resume", "overwrite", "quiet", "partition", "frame_pieces"}
     for name, default in said.items():
         if name not in ("out", "resume"):
             assert default == getattr(Options, name), name

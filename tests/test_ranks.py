@@ -19,6 +19,7 @@ import pytest
 from bodies import Weight, box
 from plates import SMALL, invoke, plate
 
+from skfsink import load
 from skfsink.errors import ParameterError
 from skfsink.fem.space import Space
 from skfsink.fields.density import DensitySolver
@@ -27,7 +28,8 @@ from skfsink.loads.schedule import Loading
 from skfsink.material import SinkLaw
 from skfsink.meshing.vtu import write_mesh
 from skfsink.methods.ranks.part import check_parts
-from skfsink.methods.ranks.partition import numbers, partition
+from skfsink.methods.ranks.parted import Parted, write_parts
+from skfsink.methods.ranks.partition import mesh_of, numbers, partition
 from skfsink.scene.controls import Controls
 from skfsink.study.ranks_scenes import compared, table
 
@@ -145,6 +147,126 @@ def test_differences_are_told_before_and_after_the_first_branch() -> None:
     (row,) = [line for line in table({"event/a_b": {**found, "elements": 9, "again": True}}) if "a b" in line]
     assert row.startswith("| a b | 9 | 0.0e+00 | 3000000.0 |")
     assert row.endswith("| 2.5e-01 | 3, 3; 3, 3 | 1.0e-15 | yes |")
+# --- parts in a folder ---
+@pytest.fixture(scope="module")
+def parted(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """A deck of the notched plate, and a folder with its parts for two ranks."""
+    folder = tmp_path_factory.mktemp("parted")
+    deck, parts, mesh = folder / "scene.toml", folder / "parts", folder / "plate.vtu"
+    write_mesh(mesh, plate())
+    deck.write_text(f'case = "single_edge_notch"\n[parameters]\nmesh = "{mesh}"\nanalysis = "dynamic"\n'
+                    'length_scale = 0.6\nevent_time = 4e-6\ndensity_solver = "jacobi"\nrecord_every = 1e-6\n',
+                    encoding="utf-8")
+    finished([sys.executable, "-m", "skfsink", "partition", str(deck), "-n", "2", "--out", str(parts)])
+    return deck, parts
+
+
+@metis
+def test_parts_in_a_folder_are_those_of_the_body(space: Space, tmp_path: Path) -> None:
+    """Fails if a part comes back with other elements, nodes, neighbours or another mesh."""
+    write_parts(space, 3, tmp_path / "parts")
+    found = Parted(tmp_path / "parts")
+    found.check(space, 3)
+    for number, part in enumerate(numbers(space.conn, partition(space.conn, 3))):
+        own, mesh = found.part(number)
+        alone, expected = found.numbers(number), mesh_of(space, part)
+        assert own.counted == alone.counted == part.counted and own.shared.keys() == part.shared.keys()
+        for one, other in ((own.elements, part.elements), (own.nodes, part.nodes), (alone.elements, part.elements),
+                           (alone.nodes, part.nodes), (mesh.p, expected.p), (mesh.t, expected.t),
+                           *((own.shared[rank], part.shared[rank]) for rank in part.shared)):
+            assert np.array_equal(one, other)
+        assert np.array_equal(Space(mesh).w, space.w[part.elements])
+
+
+@metis
+def test_parts_that_do_not_fit_are_refused_in_one_line(space: Space, tmp_path: Path) -> None:
+    """Fails if a run takes parts of another mesh, or it is not said which file is missing or damaged."""
+    folder = tmp_path / "parts"
+    with pytest.raises(ParameterError, match=r"has no parts of a body \(FileNotFoundError at partition.json\): make"):
+        Parted(folder).check(space, 2)
+    write_parts(space, 2, folder)
+    with pytest.raises(ParameterError, match="parts has 2 parts, and there is one rank: start it with mpiexec -n 2"):
+        Parted(folder).check(space, 1)
+    moved = Space(type(space.mesh)(space.mesh.p * (1 + 1e-9), space.mesh.t))
+    with pytest.raises(ParameterError, match="parts has parts of another mesh than that of the scene: make them anew"):
+        Parted(folder).check(moved, 2)
+    (folder / "part_0001.npz").write_bytes(b"PK")
+    with pytest.raises(ParameterError, match=r"part_0001.npz cannot be read"):
+        Parted(folder).part(1)
+    (folder / "part_0001.npz").unlink()
+    with pytest.raises(ParameterError, match=r"parts lacks part_0001.npz: make the parts anew with skfsink partition"):
+        Parted(folder).check(space, 2)
+
+
+@ranks
+@metis
+def test_a_run_on_parts_in_a_folder(parted: tuple[Path, Path], tmp_path: Path) -> None:
+    """Fails if parts that are read give another run than those that are cut, to the last bit."""
+    deck, parts = parted
+    for name, more in (("cut", []), ("read", ["--partition", parts])):
+        finished(on(2, "-m", "skfsink", "run", deck, "--out", tmp_path / name, "--quiet", *more))
+    assert (tmp_path / "read" / "history.csv").read_bytes() == (tmp_path / "cut" / "history.csv").read_bytes()
+    assert (tmp_path / "read" / "history.csv").read_text().count("\n") > 2
+
+
+@ranks
+@metis
+@pytest.mark.parametrize("count, said", [(1, "has 2 parts, and there is one rank: start it with mpiexec -n 2, or make "
+                                             "others with skfsink partition -n 1"),
+                                         (3, "has 2 parts, and there are 3 ranks: start it with mpiexec -n 2, or make "
+                                             "others with skfsink partition -n 3")])
+def test_parts_of_another_number_of_ranks(count: int, said: str, parted: tuple[Path, Path], tmp_path: Path) -> None:
+    """Fails if ranks take up parts that are not theirs, or more than one of them says so."""
+    command = on(count, "-m", "skfsink", "run", parted[0], "--out", tmp_path / "run", "--quiet", "--partition",
+                 parted[1])
+    assert finished(command if count > 1 else command[3:], 2) == f"skfsink: {parted[1]} {said}\n"
+    assert not (tmp_path / "run").exists()
+
+
+@ranks
+@metis
+def test_frames_in_pieces_are_those_of_one_file(parted: tuple[Path, Path], tmp_path: Path) -> None:
+    """Fails if a piece is of another moment, or a field, a node or an element differs; or ParaView finds no pieces."""
+    import vtk
+    from vtk.util.numpy_support import vtk_to_numpy
+    for name, more in (("one", []), ("pieces", ["--frame-pieces"])):
+        finished(on(2, "-m", "skfsink", "run", parted[0], "--out", tmp_path / name, "--quiet", *more))
+    one, pieces = load(tmp_path / "one"), load(tmp_path / "pieces")
+    assert len(one.frames) == len(pieces.frames) > 1 and np.array_equal(one.frames.times, pieces.frames.times)
+    for before, after in zip(one.frames, pieces.frames):
+        assert np.array_equal(before.points, after.points) and np.array_equal(before.cells[0].data, after.cells[0].data)
+        assert before.point_data.keys() == after.point_data.keys() and before.cell_data.keys() == after.cell_data.keys()
+        for name, values in before.point_data.items():
+            np.testing.assert_array_equal(values, after.point_data[name], err_msg=name)
+        for name, (values,) in before.cell_data.items():
+            np.testing.assert_allclose(values, after.cell_data[name][0], rtol=1e-5, atol=1e-9, err_msg=name)
+    index = tmp_path / "pieces" / "series" / "run_0001.pvtu"
+    reader = vtk.vtkXMLPUnstructuredGridReader()
+    reader.SetFileName(str(index))
+    reader.Update()
+    grid = reader.GetOutput()
+    assert reader.GetNumberOfPieces() == 2 and grid.GetNumberOfCells() == len(one.frames[1].cells[0].data)
+    for name, values in one.frames[1].point_data.items():
+        node = vtk_to_numpy(grid.GetPointData().GetArray("node"))
+        assert np.array_equal(vtk_to_numpy(grid.GetPointData().GetArray(name)), values[node])
+    element = vtk_to_numpy(grid.GetCellData().GetArray("element"))
+    assert np.array_equal(vtk_to_numpy(grid.GetCellData().GetArray("deleted")), one.frames[1].cell_data["deleted"][0][
+        element])
+    assert index.name in (index.parent / "run.pvd").read_text(encoding="utf-8")
+
+
+@ranks
+@metis
+def test_a_part_that_one_rank_cannot_read(parted: tuple[Path, Path], tmp_path: Path) -> None:
+    """Fails if the others go on waiting for a rank that has no part, or it is told more than once."""
+    parts = tmp_path / "parts"
+    shutil.copytree(parted[1], parts)
+    with np.load(parts / "part_0001.npz") as file:
+        kept = {name: file[name] for name in file if name != "cells"}
+    np.savez(parts / "part_0001.npz", **kept)
+    said = finished(on(2, "-m", "skfsink", "run", parted[0], "--out", tmp_path / "run", "--quiet", "--partition",
+                       parts), 2)
+    assert said.count("skfsink:") == 1 and "part_0001.npz cannot be read (KeyError): make the parts anew" in said
 
 
 # --- all ranks ---

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -29,39 +30,48 @@ class Pattern:
     `free` and, if `upper`, to the upper triangle (what a symmetric factorisation wants). It does not depend on
     values, so a factorisation keeps its analysis for the whole run.
 
+    Parameters
+    ----------
+    absent: numbers of elements that put nothing in it.
+
     Attributes
     ----------
     indptr, indices: CSR structure, rows and columns numbered over the free unknowns.
-    slot: (ne, nd, nd) position of element entry (i, j) in the data array; -1 where it is not stored.
     """
 
     def __init__(self, space: Connectivity, block: int = 1, free: np.ndarray | None = None,
-                 upper: bool = False) -> None:
-        n = space.graph.shape[0] * block
+                 upper: bool = False, absent: np.ndarray | None = None) -> None:
+        node, conn = space.graph, space.conn
+        n = node.shape[0] * block
         free = np.ones(n, bool) if free is None else free
-        number = np.where(free, np.cumsum(free) - 1, -1).astype(np.int32)
-        node = space.graph
-        # the rows of the node graph, each repeated for every component, each entry widened to a block
-        width = np.diff(node.indptr)
-        rows = np.repeat(np.arange(n), np.repeat(width, block) * block)
-        wide = (node.indices[:, None] * block + np.arange(block)).ravel()
-        starts = np.repeat(node.indptr[:-1], block) * block
-        lengths = np.repeat(width, block) * block
-        within = np.arange(rows.size) - np.repeat(np.cumsum(lengths) - lengths, lengths)
-        cols = wide[np.repeat(starts, lengths) + within]
-        keep = free[rows] & free[cols]
-        if upper:
-            keep &= cols >= rows
-        self.size = int(free.sum())
-        self.upper = upper
-        self.indices = number[cols[keep]].astype(np.int32)
-        counts = np.bincount(number[rows[keep]], minlength=self.size)
-        self.indptr = np.concatenate(([0], np.cumsum(counts))).astype(np.int32)
-        dofs = (space.conn[:, :, None] * block + np.arange(block)).reshape(len(space.conn), -1)
-        self.slot = np.empty((*dofs.shape, dofs.shape[1]), np.int32)
-        _find_slots(number[dofs], self.indptr, self.indices, upper, self.slot)
-        self.diagonal = np.empty(self.size, np.int32)
-        _find_diagonal(self.indptr, self.indices, self.diagonal)
+        self._number = np.where(free, np.cumsum(free) - 1, -1).astype(np.int32)
+        self._conn, self._block = conn, block
+        self._absent = np.zeros(0, np.int64) if absent is None else absent
+        self.size, self.upper = int(free.sum()), upper
+        self.indptr = np.zeros(self.size + 1, np.int32)
+        _count(node.indptr, node.indices, block, self._number, upper, self.indptr)
+        self.indices, self.diagonal = np.empty(self.indptr[-1], np.int32), np.full(self.size, -1, np.int32)
+        _fill(node.indptr, node.indices, block, self._number, upper, self.indptr, self.indices, self.diagonal)
+
+    @cached_property
+    def slot(self) -> np.ndarray:
+        """Position of the element entry (i, j) in the data array, -1 where it is not stored, (ne, nd, nd).
+
+        It is kept: 2.3 kB a hexahedron for its displacements; :meth:`slots` gives those of some elements.
+        """
+        return self.slots(slice(None))
+
+    def slots(self, elements: np.ndarray | slice) -> np.ndarray:
+        """Those of some elements, (m, nd, nd)."""
+        if "slot" in self.__dict__:
+            return self.slot[elements]
+        dofs = (self._conn[elements][:, :, None] * self._block + np.arange(self._block)).reshape(
+            -1, self._conn.shape[1] * self._block)
+        found: np.ndarray = np.empty((*dofs.shape, dofs.shape[1]), np.int32)
+        _find_slots(self._number[dofs], self.indptr, self.indices, self.upper, found)
+        if self._absent.size:
+            found[np.isin(np.arange(len(self._conn))[elements], self._absent)] = -1
+        return found
 
     @property
     def nnz(self) -> int:
@@ -105,8 +115,36 @@ def _find_slots(dofs, indptr, indices, upper, slot):  # type: ignore[no-untyped-
 
 
 @njit(cache=True)
-def _find_diagonal(indptr, indices, diagonal):  # type: ignore[no-untyped-def]
-    for r in range(diagonal.size):
-        for k in range(indptr[r], indptr[r + 1]):
-            if indices[k] == r:
-                diagonal[r] = k
+def _count(starts, nodes, block, number, upper, indptr):  # type: ignore[no-untyped-def]
+    """The length of each row, added up."""
+    for a in range(starts.size - 1):
+        for i in range(block):
+            row = number[a * block + i]
+            if row < 0:
+                continue
+            count = 0
+            for k in range(starts[a], starts[a + 1]):
+                for j in range(block):
+                    column = number[nodes[k] * block + j]
+                    if column >= 0 and not (upper and column < row):
+                        count += 1
+            indptr[row + 1] = indptr[row] + count
+
+
+@njit(cache=True)
+def _fill(starts, nodes, block, number, upper, indptr, indices, diagonal):  # type: ignore[no-untyped-def]
+    """The columns of each row, ascending, and the places of the diagonal."""
+    for a in range(starts.size - 1):
+        for i in range(block):
+            row = number[a * block + i]
+            if row < 0:
+                continue
+            at = indptr[row]
+            for k in range(starts[a], starts[a + 1]):
+                for j in range(block):
+                    column = number[nodes[k] * block + j]
+                    if column >= 0 and not (upper and column < row):
+                        indices[at] = column
+                        if column == row:
+                            diagonal[row] = at
+                        at += 1

@@ -15,13 +15,14 @@ dim*a + i, as in scikit-fem.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 import skfem
-from scipy.sparse import coo_array, csr_array
+from scipy.sparse import csr_array
 
 from ..errors import MeshError, place_text
 from ..system.jit import njit
@@ -30,6 +31,7 @@ from .quadrature import AXES, points, shape_functions
 
 __all__ = ["Space", "node_key"]
 
+CHUNK = 4096    # elements whose geometry is made at a time
 ON_AXIS = 1e-9  # of the size of a body of revolution: x up to which a node is on its axis
 _ELEMENTS = {"quad": skfem.ElementQuad1, "hex": skfem.ElementHex1}
 
@@ -57,10 +59,9 @@ class Space:
     X: np.ndarray = field(init=False)      #: nodal coordinates [mm], (n, dim)
     conn: np.ndarray = field(init=False)   #: nodes of the elements, lexicographic, (ne, na)
     N: np.ndarray = field(init=False)      #: shape functions at the Gauss points, (nq, na)
-    dN: np.ndarray = field(init=False)     #: their gradients Grad N [1/mm], (ne, nq, na, dim)
     w: np.ndarray = field(init=False)      #: quadrature weights of the body [mm^volume_dim], (ne, nq)
     dX: np.ndarray = field(init=False)     #: those of the mesh, which are the same but for 2 pi R [mm^dim], (ne, nq)
-    invJ: np.ndarray = field(init=False)   #: d xi/d X [1/mm], (ne, nq, dim, dim)
+    _unit: np.ndarray = field(init=False, repr=False)  # gradients of N on the unit square or cube, (nq, na, dim)
 
     def __post_init__(self) -> None:
         name = self.mesh.refdom.name.lower()[:4].rstrip("a")
@@ -76,35 +77,32 @@ class Space:
         if not np.isfinite(X).all():
             raise MeshError("the mesh has a node whose coordinates are not finite numbers")
         N, dN_ref = shape_functions(points(dim))
+        object.__setattr__(self, "_unit", dN_ref)
         for _ in range(2):
             conn = np.ascontiguousarray(mesh.t[order].T).astype(np.int64)
-            J = np.einsum("eai,qak->eqik", X[conn], dN_ref)
-            detJ = np.linalg.det(J)
+            detJ = np.concatenate([np.linalg.det(J) for J in _jacobians(X, conn, dN_ref)])
             if not (detJ < 0).all():
                 break
             # numbered in the other sense throughout: exchange the first two axes of every element
             swapped = reference[:, [1, 0, *range(2, dim)]] @ (2 ** np.arange(dim))
             mesh = type(mesh)(mesh.p, np.ascontiguousarray(mesh.t[order[swapped]]))
         object.__setattr__(self, "mesh", mesh)
-        unused = len(X) - len(np.unique(conn))
+        unused = len(X) - np.count_nonzero(np.bincount(conn.ravel(), minlength=len(X)))
         if unused:
             raise MeshError(f"the mesh has {unused} node(s) that belong to no element")
         if not (detJ > 0).all():
             e = int(np.argmin(detJ.min(axis=1)))
             raise MeshError(f"element {e} is inverted or degenerate: its Jacobian is {detJ[e].min():.3g} at a Gauss "
                             f"point, and must be positive")
-        invJ = np.linalg.inv(J)
         dX = detJ / 2**dim
-        for name_, value in (("X", X), ("conn", conn), ("N", N), ("dX", dX), ("w", dX * self._round(X, conn, N)),
-                             ("invJ", invJ), ("dN", np.einsum("qak,eqkJ->eqaJ", dN_ref, invJ))):
+        w = dX * self._round(X, conn, N) if self.axisymmetric else dX
+        for name_, value in (("X", X), ("conn", conn), ("N", N), ("dX", dX), ("w", w)):
             value = np.ascontiguousarray(value)
             value.setflags(write=False)
             object.__setattr__(self, name_, value)
 
-    def _round(self, X: np.ndarray, conn: np.ndarray, N: np.ndarray) -> np.ndarray | float:
-        """Way around the axis at the Gauss points, 2 pi R [mm], (ne, nq); 1 of other bodies."""
-        if not self.axisymmetric:
-            return 1.0
+    def _round(self, X: np.ndarray, conn: np.ndarray, N: np.ndarray) -> np.ndarray:
+        """Way around the axis of a body of revolution at the Gauss points, 2 pi R [mm], (ne, nq)."""
         if X.shape[1] == 3:
             raise MeshError("a body of revolution is meshed by quadrilaterals in its half plane x >= 0; this mesh has "
                             "hexahedra: take element jbar")
@@ -114,6 +112,40 @@ class Space:
                             f"{place_text(X[least])} mm is beyond the axis: move the mesh by {-X[least, 0]:.3g} mm "
                             f"along x, or keep its half")
         return 2.0 * np.pi * (X[conn, 0] @ N.T)
+
+    # --- geometry of elements, by some of them at a time: of all it takes 2 kB a hexahedron ---
+    def chunks(self) -> Iterator[slice]:
+        """All elements in order, some thousands at a time."""
+        return (slice(at, min(at + CHUNK, self.n_elements)) for at in range(0, self.n_elements, CHUNK))
+
+    @cached_property
+    def invJ(self) -> np.ndarray:
+        """d xi/d X [1/mm], (ne, nq, dim, dim); it is kept."""
+        whole: np.ndarray = np.empty((*self.w.shape, self.dim, self.dim))
+        for some in self.chunks():
+            whole[some] = self.inverse(some)
+        whole.setflags(write=False)
+        return whole
+
+    def inverse(self, elements: np.ndarray | slice) -> np.ndarray:
+        """d xi/d X of some elements, (m, nq, dim, dim)."""
+        if "invJ" in self.__dict__:
+            return self.invJ[elements]
+        found = [np.linalg.inv(J) for J in _jacobians(self.X, self.conn[elements], self._unit)]
+        return found[0] if len(found) == 1 else np.concatenate(found)
+
+    @property
+    def dN(self) -> np.ndarray:
+        """Grad N of all elements, see :meth:`slopes`: made anew each time."""
+        return self.slopes(slice(None))
+
+    def slopes(self, elements: np.ndarray | slice) -> np.ndarray:
+        """Gradients of the shape functions Grad N at the Gauss points of some elements [1/mm], (m, nq, na, dim)."""
+        inverse = self.invJ[elements]
+        found: np.ndarray = np.empty((len(inverse), *self._unit.shape))
+        _slopes(self._unit, inverse, found)
+        found.setflags(write=False)
+        return found
 
     @cached_property
     def on_axis(self) -> np.ndarray:
@@ -206,7 +238,10 @@ class Space:
 
     def gradient(self, nodal: np.ndarray) -> np.ndarray:
         """Gradient (ne, nq, ..., dim) of the Q1 field with nodal values (n, ...)."""
-        return np.einsum("ea...,eqaJ->eq...J", nodal[self.conn], self.dN)
+        out: np.ndarray = np.empty((*self.w.shape, *nodal.shape[1:], self.dim))
+        for some in self.chunks():
+            np.einsum("ea...,eqaJ->eq...J", nodal[self.conn[some]], self.slopes(some), out=out[some])
+        return out
 
     def deformation_gradient(self, u: np.ndarray) -> np.ndarray:
         """F = I + Grad u at the Gauss points, (ne, nq, 3, 3); in 2D F_33 = 1, or r/R of a body of revolution."""
@@ -230,7 +265,10 @@ class Space:
 
         They are the means of the gradients of the shape functions, and of N_a/R in a body of revolution.
         """
-        slopes = np.einsum("eq,eqai->eai", self.w, self.dN) / self.V[:, None, None]
+        slopes: np.ndarray = np.empty((*self.conn.shape, self.dim))
+        for some in self.chunks():
+            np.einsum("eq,eqai->eai", self.w[some], self.slopes(some), out=slopes[some])
+        slopes /= self.V[:, None, None]
         if self.axisymmetric:
             slopes[..., 0] += np.einsum("eq,eqa->ea", self.w, self.around) / self.V[:, None]
         return slopes
@@ -250,12 +288,15 @@ class Space:
         """`conn` unsigned, which spares the compiled loops a test for negative indices."""
         return self.conn.astype(np.uint32)
 
-    @cached_property
+    @property
     def incidence(self) -> tuple[np.ndarray, np.ndarray]:
-        """Elements at a node: (`start` (n+1,), `entry`), entry = na*element + local node, ascending for each node."""
-        entry = np.argsort(self.conn.ravel(), kind="stable")
-        start = np.zeros(self.n_nodes + 1, np.int64)
+        """Elements at a node: (`start` (n+1,), `entry`), entry = na*element + local node, ascending for each node.
+
+        It is made anew each time.
+        """
+        start, entry = np.zeros(self.n_nodes + 1, np.int64), np.empty(self.conn.size, np.int64)
         np.cumsum(np.bincount(self.conn.ravel(), minlength=self.n_nodes), out=start[1:])
+        _place_entries(self.nodes, start[:-1].copy(), entry)
         return start, entry
 
     @cached_property
@@ -275,12 +316,20 @@ class Space:
     @cached_property
     def graph(self) -> csr_array:
         """Node adjacency: nodes that share an element, symmetric with a full diagonal, (n, n)."""
-        na = self.conn.shape[1]
-        rows, cols = np.repeat(self.conn, na, axis=1).ravel(), np.tile(self.conn, (1, na)).ravel()
-        graph = csr_array(coo_array((np.ones(rows.size, np.int8), (rows, cols)), shape=(self.n_nodes,) * 2))
-        graph.sum_duplicates()
-        graph.data[:] = 1
-        return graph
+        start, entry = self.incidence
+        indptr = np.zeros(self.n_nodes + 1, np.int32)
+        seen = np.full(self.n_nodes, -1, np.int32)
+        _count_neighbours(self.nodes, start, entry, seen, indptr)
+        indices = np.empty(indptr[-1], np.int32)
+        seen[:] = -1
+        _list_neighbours(self.nodes, start, entry, seen, indptr, indices)
+        return csr_array((np.ones(indices.size, np.int8), indices, indptr), shape=(self.n_nodes,) * 2)
+
+
+def _jacobians(X: np.ndarray, conn: np.ndarray, dN_ref: np.ndarray) -> Iterator[np.ndarray]:
+    """d X/d xi (m, nq, dim, dim) of the elements `conn` (ne, na), :data:`CHUNK` of them at a time."""
+    for at in range(0, len(conn), CHUNK):
+        yield np.einsum("eai,qak->eqik", X[conn[at:at + CHUNK]], dN_ref)
 
 
 def node_key(nodes: np.ndarray, n: int) -> np.ndarray:
@@ -327,3 +376,54 @@ def _lump(w, values, conn, N, out):  # type: ignore[no-untyped-def]
             for q in range(8):
                 total += x[q] * N[q, a]
             out[conn[e, a]] += total
+
+
+@njit(cache=True)
+def _slopes(unit, inverse, out):  # type: ignore[no-untyped-def]
+    """out[e, q, a] = unit[q, a] . inverse[e, q]."""
+    ne, nq, na, dim = out.shape
+    for e in range(ne):
+        for q in range(nq):
+            for a in range(na):
+                for j in range(dim):
+                    total = 0.0
+                    for k in range(dim):
+                        total += unit[q, a, k] * inverse[e, q, k, j]
+                    out[e, q, a, j] = total
+
+
+@njit(cache=True)
+def _place_entries(conn, place, entry):  # type: ignore[no-untyped-def]
+    ne, na = conn.shape
+    for e in range(ne):
+        for a in range(na):
+            node = conn[e, a]
+            entry[place[node]] = e * na + a
+            place[node] += 1
+
+
+@njit(cache=True)
+def _count_neighbours(conn, start, entry, seen, indptr):  # type: ignore[no-untyped-def]
+    na = conn.shape[1]
+    for node in range(seen.size):
+        count = 0
+        for k in range(start[node], start[node + 1]):
+            for other in conn[entry[k] // na]:
+                if seen[other] != node:
+                    seen[other] = node
+                    count += 1
+        indptr[node + 1] = indptr[node] + count
+
+
+@njit(cache=True)
+def _list_neighbours(conn, start, entry, seen, indptr, indices):  # type: ignore[no-untyped-def]
+    na = conn.shape[1]
+    for node in range(seen.size):
+        at = indptr[node]
+        for k in range(start[node], start[node + 1]):
+            for other in conn[entry[k] // na]:
+                if seen[other] != node:
+                    seen[other] = node
+                    indices[at] = other
+                    at += 1
+        indices[indptr[node]:at].sort()

@@ -231,6 +231,13 @@ class Body:
         W_max[self.broken] = 0.0
         return replace(state, gamma=self.kept(state.gamma), W_max=W_max)
 
+    def release(self) -> None:
+        """Free the memory of matrices, and of solvers for gamma; they are made again when they are needed."""
+        if self.broken.size:
+            self._begun  # noqa: B018  (kept, since it is what they would be made again for)
+        self.density.release()
+        vars(self.space).pop("invJ", None)
+
     def take(self, state: State) -> np.ndarray:
         """Bring the momentum balance to load time, density and displacement of a state; its force less dead loads."""
         self.momentum.set_time(state.grip)

@@ -83,7 +83,7 @@ def configurational_forces(momentum: Momentum, u: np.ndarray) -> np.ndarray:
 def point_stress(momentum: Momentum, u: np.ndarray, elements: np.ndarray, gamma: np.ndarray) -> PointStress:
     """Energy and stress of `elements` (m,) at the displacement `u` (n, dim), for the density `gamma` (m, nq)."""
     space, dim = momentum.space, momentum.space.dim
-    H = np.swapaxes(u[space.conn[elements]], 1, 2)[:, None] @ space.dN[elements]
+    H = np.swapaxes(u[space.conn[elements]], 1, 2)[:, None] @ space.slopes(elements)
     found = PointStress(np.zeros_like(gamma), np.zeros_like(gamma), np.zeros_like(H), H, np.zeros_like(gamma),
                         np.zeros_like(gamma))
     for part, rows, own in among(momentum.parts, elements):

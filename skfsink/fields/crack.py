@@ -39,6 +39,7 @@ from ..fem.space import Space
 __all__ = ["CRACKED", "CrackTracker", "Plane", "Tips"]
 
 CRACKED = 0.1
+NODES = 8192     # whose distances to their neighbours are made at a time
 ADVANCES = 10   # passes within which a tip that advances has cracked a node
 
 
@@ -110,10 +111,7 @@ class CrackTracker:
         #: l/c_s [s]; None if the clock counts passes
         self._transit = None if shear_wave_speed is None else length_scale / (shear_wave_speed * 1e3)
         self._grips, self._rim, self._planes = grips, rim, planes
-        rows = np.repeat(np.arange(space.n_nodes), np.diff(space.graph.indptr))
-        lengths = np.linalg.norm(space.X[rows] - space.X[space.graph.indices], axis=1)
-        self._graph = csr_array((np.maximum(lengths, 1e-12), space.graph.indices, space.graph.indptr),
-                                shape=space.graph.shape)
+        self._graph = _ways(space)
         self._before = None
         if before is not None and gone is not None and gone.size:
             beside = self._graph @ before.astype(float) > 0.0
@@ -318,6 +316,18 @@ class CrackTracker:
         self.arrival = None if np.isnan(arrival) else arrival
         for name in self._REMEMBERED:
             setattr(self, name, memory[name].item())
+
+
+def _ways(space: Space) -> csr_array:
+    """Distances [mm] of nodes that share an element, (n, n)."""
+    graph = space.graph
+    lengths: np.ndarray = np.empty(graph.nnz)
+    for first in range(0, space.n_nodes, NODES):
+        starts = graph.indptr[first:first + NODES + 1]
+        some = slice(starts[0], starts[-1])
+        rows = np.repeat(np.arange(first, first + starts.size - 1), np.diff(starts))
+        lengths[some] = np.linalg.norm(space.X[rows] - space.X[graph.indices[some]], axis=1)
+    return csr_array((np.maximum(lengths, 1e-12, out=lengths), graph.indices, graph.indptr), shape=graph.shape)
 
 
 def _without(graph: csr_array, space: Space, gone: np.ndarray) -> csr_array:

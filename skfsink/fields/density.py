@@ -104,27 +104,41 @@ class DensitySolver:
         phi = by_element(ne, law.phi, regions, lambda region: region.sink_law.phi)
         self.phi = phi[:, None] if isinstance(phi, np.ndarray) else phi
         self.failure_energy = by_element(ne, law.failure_energy, regions, lambda region: region.sink_law.failure_energy)
-        self.pattern, self.absent = Pattern(space), np.zeros(0, np.int64) if absent is None else absent
-        self._assembled = Pattern(space) if self.absent.size else self.pattern
-        self._assembled.slot[self.absent] = -1
+        self.absent = np.zeros(0, np.int64) if absent is None else absent
         self.backend = backend(kernels).density(space, law.length_scale)
         self.load = self._lump(np.ones_like(space.w))
         self._bounded = self._quadrature.monotone and gradient == "monotone"
+        self._counted = space.exchange.counts(space.n_nodes)
+        self.active_zone, self._solver, self._tolerance = active_zone and self._quadrature.monotone, solver, tolerance
+        self._released = 0
+        self._prepare()
+        self._residual = 0.0
+        self.solves = self.skipped = self.iterations = self.fallbacks = 0
+
+    def _prepare(self) -> None:
+        """Matrices, and what solves with them."""
+        space = self.space
+        self.pattern = Pattern(space)
+        self._assembled = Pattern(space, absent=self.absent) if self.absent.size else self.pattern
         self._laplacian = self.backend.laplacian(self._assembled, monotone=self._bounded)
         self._laplacian[self.pattern.diagonal[self.load == 0.0]] = 1.0
         self._data, self._laplacian_diagonal = self._laplacian.copy(), self._laplacian[self.pattern.diagonal]
-        self._counted = space.exchange.counts(space.n_nodes)
         self._direct: Factorization | None = None
         self.zone: ActiveZone | None = None
-        if solver == "jacobi" and self._quadrature.monotone:
+        if self._solver == "jacobi" and self._quadrature.monotone:
             intact = self._assemble(np.ones_like(space.w))[self.pattern.diagonal]
-            self._iterative: AmgCG | JacobiCG = JacobiCG(space.exchange, space.exchange.whole(intact), tolerance)
+            self._iterative: AmgCG | JacobiCG = JacobiCG(space.exchange, space.exchange.whole(intact), self._tolerance)
         else:
-            self._iterative = AmgCG(self.pattern.matrix(self._assemble(np.ones_like(space.w))), tolerance)
-        if active_zone and self._quadrature.monotone:
-            self.zone = ActiveZone(space.X, law.length_scale, self._iterative)
-        self._residual = 0.0
-        self.solves = self.skipped = self.iterations = self.fallbacks = 0
+            self._iterative = AmgCG(self.pattern.matrix(self._assemble(np.ones_like(space.w))), self._tolerance)
+        if self.active_zone:
+            self.zone = ActiveZone(space.X, self.law.length_scale, self._iterative)
+
+    def release(self) -> None:
+        """Free the memory of matrices and solvers; they are made again when they are needed."""
+        self._released = self.factorisations
+        for name in ("pattern", "_assembled", "_laplacian", "_data", "_laplacian_diagonal", "_direct", "zone",
+                     "_iterative"):
+            vars(self).pop(name, None)
 
     @property
     def residual(self) -> float:
@@ -140,7 +154,8 @@ class DensitySolver:
     @property
     def factorisations(self) -> int:
         """Numerical factorisations made so far."""
-        return 0 if self._direct is None else self._direct.count
+        direct = vars(self).get("_direct")
+        return self._released + (0 if direct is None else int(direct.count))
 
     def solve(self, W_max: np.ndarray, gamma: np.ndarray, tolerance: float | None = None) -> np.ndarray:
         """Nodal gamma (n,) for the history `W_max` (ne, nq) [MPa], from the guess `gamma`; see :meth:`update`."""
@@ -166,6 +181,8 @@ class DensitySolver:
             self.skipped += 1
             return before
         self.solves += 1
+        if "pattern" not in vars(self):
+            self._prepare()
         data = self._assemble(sink)
         result, zones = None, before.zones
         if self._quadrature.monotone or sink.max() < 1e3 * sink.min():

@@ -32,11 +32,12 @@ def joined(conn: np.ndarray, holds: np.ndarray) -> np.ndarray:
 
     `holds` (ne, na) is of an element and its node; an element of whose nodes none holds is a piece of its own.
     """
-    element, corner = np.nonzero(holds)
-    touches = csr_array((np.ones(len(element), np.int8), (element, conn[element, corner])),
-                        shape=(len(conn), int(conn.max(initial=0)) + 1))
-    _, piece = connected_components(touches @ touches.T, directed=False)
-    return np.asarray(piece)
+    ne, n = len(conn), int(conn.max(initial=0)) + 1
+    starts = np.concatenate([[0], np.cumsum(holds.sum(axis=1)), np.full(n, holds.sum())]).astype(np.int32)
+    nodes = (ne + conn[holds]).astype(np.int32)  # a graph of elements, then nodes: far less than one of elements alone
+    graph = csr_array((np.ones(nodes.size, np.int8), nodes, starts), shape=(ne + n, ne + n))
+    _, piece = connected_components(graph, directed=False)
+    return np.asarray(piece[:ne])
 
 
 def fragments(space: Space, gamma: np.ndarray, deleted: np.ndarray, length_scale: float, floor: float) -> Fragments:

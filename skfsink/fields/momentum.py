@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from ..errors import ParameterError
-from ..fem.backend import BulkViscosity, Part
+from ..fem.backend import BulkViscosity, MomentumBackend, Part
 from ..fem.backends import backend
 from ..fem.elements import check_element
 from ..fem.pattern import Pattern
@@ -73,9 +73,8 @@ class Momentum:
         self.regions, self.kernels = tuple(regions), kernels
         self.parts = self._divide(regions)
         materials = [part.material for part in self.parts]
-        self.backend = backend(kernels).momentum(space, self.parts, element, threads=threads,
-                                                  bulk_viscosity=bulk_viscosity)
-        self.bulk_viscosity = bulk_viscosity
+        self.bulk_viscosity, self._threads = bulk_viscosity, threads
+        self.backend: MomentumBackend = self.new_backend()
         greatest = space.exchange.greatest
         self.is_viscous = any(bulk_viscosity) or greatest(max(m.viscosity for m in materials)) > 0.0
         self.compression = 0.0
@@ -96,6 +95,15 @@ class Momentum:
         self._intact = self._mass = self._lumped(np.ones_like(space.w))
         self._gamma: np.ndarray | None = np.ones_like(space.w)
         self.backend.set_gamma(self._gamma)
+
+    def new_backend(self) -> MomentumBackend:
+        """What evaluates the weak forms, made anew."""
+        return backend(self.kernels).momentum(self.space, self.parts, self.element, threads=self._threads,
+                                              bulk_viscosity=self.bulk_viscosity)
+
+    def evaluate_by(self, other: MomentumBackend) -> None:
+        """Let another backend evaluate the weak forms from now on, or tell that its density has changed."""
+        self.backend, self._gamma = other, None
 
     def _divide(self, regions: Sequence[Region]) -> list[Part]:
         """The body by its materials; without regions it is one part, all elements in their order."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +14,8 @@ from .momentum import Momentum
 from .state import State
 
 __all__ = ["Pieces", "pieces_of"]
+
+SOME = 8192  # elements whose corners are summed at a time
 
 
 class Pieces(NamedTuple):
@@ -67,33 +70,55 @@ def pieces_of(momentum: Momentum, state: State) -> Pieces:
 def _motion(space: Space, alive: np.ndarray, piece: np.ndarray, mass: np.ndarray, total: np.ndarray,
             state: State) -> Pieces:
     """Sums over the corners of elements; `mass` (alive, na) of them, `total` (p,) of the pieces."""
-    nodes, number, dim = space.conn[alive], len(total), space.dim
+    number, dim = len(total), space.dim
+    X, way = space.X + state.u, np.ones(dim) if not space.axisymmetric else np.array([0.0, 1.0])
 
-    def sums(values: np.ndarray) -> np.ndarray:
-        """Of values (alive, na, ...) over the pieces, (p, ...)."""
-        flat = values.sum(axis=1).reshape(len(alive), math.prod(values.shape[2:]))
+    def sums(of: Callable[[slice], np.ndarray]) -> np.ndarray:
+        """Of values (m, na, ...) at the corners of some elements over the pieces, (p, ...)."""
+        parts = [of(slice(at, at + SOME)).sum(axis=1) for at in range(0, max(len(alive), 1), SOME)]
+        flat = np.concatenate(parts)
+        shape, flat = flat.shape[1:], flat.reshape(len(flat), math.prod(flat.shape[1:]))
         found = np.stack([np.bincount(piece, column, number) for column in flat.T], axis=1)
-        return found.astype(float).reshape(number, *values.shape[2:])
+        return found.astype(float).reshape(number, *shape)
 
-    weight = np.where((total > 0.0)[piece, None], mass, (space.w[alive] @ space.N))  # of one without mass its volume
-    x, v = (space.X + state.u)[nodes], state.v[nodes]
-    kinetic = 0.5 * sums(mass * (v**2).sum(axis=2))
-    if space.axisymmetric:
-        x, v = x * [0.0, 1.0], v * [0.0, 1.0]
-    centre = sums(weight[..., None] * x) / sums(weight)[:, None]
-    momentum = sums(mass[..., None] * v)
+    def weight(some: slice) -> np.ndarray:
+        """Mass, of a piece without mass its volume."""
+        return np.where((total > 0.0)[piece[some], None], mass[some], space.w[alive[some]] @ space.N)
+
+    def x(some: slice) -> np.ndarray:
+        return X[space.conn[alive[some]]] * way
+
+    def v(some: slice) -> np.ndarray:
+        return state.v[space.conn[alive[some]]] * way
+
+    kinetic = 0.5 * sums(lambda e: mass[e] * (state.v[space.conn[alive[e]]]**2).sum(axis=2))
+    centre = sums(lambda e: weight(e)[..., None] * x(e)) / sums(weight)[:, None]
+    momentum = sums(lambda e: mass[e][..., None] * v(e))
     velocity = momentum / np.where(total > 0.0, total, 1.0)[:, None]
-    r, w = x - centre[piece][:, None], v - velocity[piece][:, None]
+
+    def r(some: slice) -> np.ndarray:
+        return x(some) - centre[piece[some]][:, None]
+
+    def angular_momentum(some: slice) -> np.ndarray:
+        w = v(some) - velocity[piece[some]][:, None]
+        if dim == 3:
+            return mass[some][..., None] * np.cross(r(some), w)
+        return mass[some] * (r(some)[..., 0] * w[..., 1] - r(some)[..., 1] * w[..., 0])
+
+    def inertia_of(some: slice) -> np.ndarray:
+        square = (r(some)**2).sum(axis=2)
+        if dim == 2:
+            return mass[some] * square
+        outer = square[..., None, None] * np.eye(3) - r(some)[..., :, None] * r(some)[..., None, :]
+        return mass[some][..., None, None] * outer
+
+    angular, inertia = sums(angular_momentum), sums(inertia_of)
     if dim == 2:
-        angular = sums(mass * (r[..., 0] * w[..., 1] - r[..., 1] * w[..., 0]))[:, None]
-        inertia = sums(mass * (r**2).sum(axis=2))[:, None]
+        angular, inertia = angular[:, None], inertia[:, None]
         spin = np.divide(angular, inertia, out=np.zeros_like(angular), where=inertia > 0.0)
     else:
-        angular = sums(mass[..., None] * np.cross(r, w))
-        outer = (r**2).sum(axis=2)[..., None, None] * np.eye(3) - r[..., :, None] * r[..., None, :]
-        inertia = sums(mass[..., None, None] * outer)
         spin = np.einsum("pij,pj->pi", np.linalg.pinv(inertia, hermitian=True), angular)
-    return Pieces(np.bincount(piece, minlength=number), sums(space.w[alive]), total, centre,
+    return Pieces(np.bincount(piece, minlength=number), sums(lambda e: space.w[alive[e]]), total, centre,
                   velocity, momentum, kinetic,
                   0.5 * (momentum * velocity).sum(axis=1), 0.5 * (angular * spin).sum(axis=1), angular, spin,
-                  sums(space.dX[alive]))
+                  sums(lambda e: space.dX[alive[e]]))

@@ -72,7 +72,7 @@ def _stretches(momentum: Momentum, state: State, places: Places) -> np.ndarray:
     w = space.w[elements] / space.V[elements, None]
     F = np.zeros((elements.size, 3, 3))
     F[:] = np.eye(3)
-    F[:, :dim, :dim] += np.einsum("eq,eai,eqaJ->eiJ", w, state.u[space.conn[elements]], space.dN[elements])
+    F[:, :dim, :dim] += np.einsum("eq,eai,eqaJ->eiJ", w, state.u[space.conn[elements]], space.slopes(elements))
     if space.axisymmetric:
         F[:, 2, 2] += np.einsum("eq,ea,eqa->e", w, state.u[space.conn[elements], 0], space.around[elements])
     upright = np.linalg.det(F) > 0.0

@@ -113,7 +113,7 @@ def energy_release_rate(body: Body, state: State, tip: np.ndarray, direction: np
     elements = domain.elements
     gamma = momentum.effective(state.gamma, state.deleted, elements)
     stress = point_stress(momentum, state.u, elements, gamma)
-    w, dN = space.w[elements], space.dN[elements]
+    w, dN = space.w[elements], space.slopes(elements)
     dq = (domain.q[:, None, None] @ dN)[..., 0, :]
     dq *= w[..., None]
     static = -np.einsum("eqKJ,eqJ->K", stress.tensor, dq) / domain.thickness
@@ -223,7 +223,7 @@ def _inertia(space: Space, state: State, domain: _Domain, H: np.ndarray,
         return np.zeros_like(rho), np.zeros(space.dim)
     half = 0.5 * np.einsum("eai,eai->ea", v, v)
     push = np.einsum("eqi,eqiK->eqK", space.N @ a, H)
-    push -= (half[:, None, None] @ space.dN[domain.elements])[..., 0, :]
+    push -= (half[:, None, None] @ space.slopes(domain.elements))[..., 0, :]
     weight = space.w[domain.elements] * rho * (domain.q @ space.N.T)
     return rho * (half @ space.N.T), np.einsum("eq,eqK->K", weight, push)
 

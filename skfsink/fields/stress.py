@@ -51,7 +51,7 @@ def _at_points(momentum: Momentum, u: np.ndarray, part: Part, rows: slice | np.n
     elements = part.numbers(rows)
     F = np.zeros((*gamma.shape, 3, 3))
     F[...] = np.eye(3)
-    F[..., :space.dim, :space.dim] += np.einsum("eai,eqaJ->eqiJ", u[space.conn[elements]], space.dN[elements])
+    F[..., :space.dim, :space.dim] += np.einsum("eai,eqaJ->eqiJ", u[space.conn[elements]], space.slopes(elements))
     space.add_hoop(F, u, elements)
     raw = _determinant(F)
     flat = raw < J_FLOOR

@@ -80,17 +80,18 @@ def _lanczos(matrix: Rows, unknowns: Unknowns, start: np.ndarray, tolerance: flo
     eigenvalue that has been found a second time, but none that is wrong.
     """
     residual = np.inf
+    kept: np.ndarray = np.empty((STEPS, start.size))  # memory is taken as they are written
     for _ in range(RESTARTS):
-        vectors: list[np.ndarray] = [start]
+        kept[0], count = start, 1
         diagonal: list[float] = []
         beside: list[float] = []
-        previous, beta = np.zeros_like(start), 0.0
+        previous, beta, following = np.zeros_like(start), 0.0, np.empty_like(start)
         while True:
-            following = np.empty_like(start)
-            _product(matrix, vectors[-1], previous, beta, unknowns.counted, following)
+            last_one = kept[count - 1]
+            _product(matrix, last_one, previous, beta, unknowns.counted, following)
             unknowns.whole(following)
-            alpha = unknowns.total(_along(following, vectors[-1], unknowns.counted))
-            beta = float(np.sqrt(unknowns.total(_without(following, vectors[-1], alpha, unknowns.counted))))
+            alpha = unknowns.total(_along(following, last_one, unknowns.counted))
+            beta = float(np.sqrt(unknowns.total(_without(following, last_one, alpha, unknowns.counted))))
             if beta > 0.0:
                 following /= beta
             if not np.isfinite(alpha + beta):
@@ -99,12 +100,12 @@ def _lanczos(matrix: Rows, unknowns: Unknowns, start: np.ndarray, tolerance: flo
             last = len(diagonal) - 1
             values, modes = la.eigh_tridiagonal(diagonal, beside, select="i", select_range=(last, last))
             residual = beta * abs(modes[-1, 0]) / max(abs(values[0]), 1e-300)
-            if not residual > tolerance or len(vectors) == STEPS:
+            if not residual > tolerance or count == STEPS:
                 break
-            previous = vectors[-1]
-            vectors.append(following)
+            previous, kept[count] = last_one, following
             beside.append(beta)
-        start = modes[:, 0] @ np.array(vectors)
+            count += 1
+        start = modes[:, 0] @ kept[:count]
         start /= np.sqrt(unknowns.dot(start, start))
         if not residual > tolerance:
             return float(values[0]), start

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import xml.etree.ElementTree as ET
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,7 +11,9 @@ import numpy as np
 
 from ..fields.fragments import SPENT
 
-__all__ = ["SPENT", "Frame", "frame_file", "read_frame"]
+__all__ = ["NODE", "SPENT", "Frame", "frame_file", "pieces_of_frame", "read_fields", "read_frame"]
+
+ELEMENT, NODE = "element", "node"  # arrays of pieces: numbers in the whole body
 
 
 def frame_file(name: str, number: int) -> str:
@@ -42,9 +45,40 @@ class Frame:
         return ", ".join(filter(None, [self.label, f"{self.time * 1e6:.1f} µs" if np.isfinite(self.time) else ""]))
 
 
+def pieces_of_frame(path: Path) -> Path:
+    """The file that names the pieces of a frame, where ranks have written one each, of the `path` of its one file."""
+    return path.with_suffix(".pvtu")
+
+
+def read_fields(path: Path) -> meshio.Mesh:
+    """The mesh with the fields of a frame, from one file, or put together from the pieces that ranks have written."""
+    index = pieces_of_frame(path)
+    if path.is_file() or not index.is_file():
+        return meshio.read(path)
+    names = [piece.attrib["Source"] for piece in ET.parse(index).iter("Piece")]
+    pieces = [meshio.read(path.parent / name) for name in names]
+    nodes = [piece.point_data.pop(NODE) for piece in pieces]
+    elements = [piece.cell_data.pop(ELEMENT)[0] for piece in pieces]
+    cells = [number[piece.cells[0].data] for piece, number in zip(pieces, nodes)]
+    kind = pieces[0].cells[0].type
+    return meshio.Mesh(
+        _joined([piece.points for piece in pieces], nodes), [(kind, _joined(cells, elements).astype("i4"))],
+        {name: _joined([piece.point_data[name] for piece in pieces], nodes) for name in pieces[0].point_data},
+        {name: [_joined([piece.cell_data[name][0] for piece in pieces], elements)] for name in pieces[0].cell_data})
+
+
+def _joined(values: list[np.ndarray], numbers: list[np.ndarray]) -> np.ndarray:
+    """Values of all pieces in the order of the whole body."""
+    whole: np.ndarray = np.empty((1 + max(int(number.max()) for number in numbers), *values[0].shape[1:]),
+                                 values[0].dtype)
+    for value, number in zip(values, numbers):
+        whole[number] = value
+    return whole
+
+
 def read_frame(path: Path, time: float, label: str, dim: int) -> Frame:
     """A frame of the ParaView series as the fields to draw."""
-    data = meshio.read(path)
+    data = read_fields(path)
     u, v = (np.asarray(data.point_data[name], float)[:, :dim] for name in ("displacement", "velocity"))
     return Frame(time, label, u, np.asarray(data.point_data["gamma"], float),
                  np.asarray(data.cell_data["deleted"][0], bool), v)

@@ -23,7 +23,7 @@ from ..errors import OutputError
 from ..scene.stored import SCENE, StoredScene
 from ..system.files import reported
 from .fragments import FRAGMENTS, read_fragments
-from .frame import frame_file
+from .frame import frame_file, read_fields
 from .history import History, Table, deletions_header
 from .probes import ProbeTable, read_probes
 from .series import frame_times
@@ -120,7 +120,7 @@ class Frames(Sequence[meshio.Mesh]):
         printed = io.StringIO()
         try:
             with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed):  # meshio prints, and exits
-                mesh = meshio.read(path)
+                mesh = read_fields(path)
         except (Exception, SystemExit):
             raise OutputError(f"{path} is missing or damaged") from None
         if deformed:

@@ -6,8 +6,9 @@ a run was killed. Nothing written depends on the clock: two equal runs give equa
 
 from __future__ import annotations
 
+import shutil
 import xml.etree.ElementTree as ET
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
@@ -16,12 +17,12 @@ import numpy as np
 
 from ..errors import OutputError
 from ..fem.space import Space
-from ..system.files import prepare_folder, replaced, write_atomic
-from .frame import frame_file
+from ..system.files import prepare_folder, replaced, reported, write_atomic
+from .frame import frame_file, pieces_of_frame
 from .history import HISTORY_COLUMNS, History
 
-__all__ = ["HISTORY_COLUMNS", "History", "Series", "frame_times", "prepare_folder", "replaced",
-           "write_atomic"]
+__all__ = ["HISTORY_COLUMNS", "History", "Series", "frame_mesh", "frame_times", "prepare_folder", "replaced",
+           "write_atomic", "write_piece"]
 
 VTK_ORDER = {2: [0, 1, 3, 2], 3: [0, 1, 3, 2, 4, 5, 7, 6]}  # corners of `Space.conn` in the order of VTK
 
@@ -47,8 +48,6 @@ class Series:
         self.times: list[float] = []
         self._writer = ThreadPoolExecutor(1, "frames")  # compressing a frame takes as long as twenty steps
         self._pending: Future[None] | None = None
-        self._points = _vectors(space.X)
-        self._cells = [("quad" if space.dim == 2 else "hexahedron", space.conn[:, VTK_ORDER[space.dim]].astype("i4"))]
 
     @property
     def path(self) -> Path:
@@ -56,8 +55,9 @@ class Series:
         return self.folder / f"{self.name}.pvd"
 
     def frame(self, number: int) -> Path:
-        """The VTU file of a frame."""
-        return self.folder / frame_file(self.name, number)
+        """The file of a frame: VTU, or where ranks have written a piece each, the PVTU file that names them."""
+        path = self.folder / frame_file(self.name, number)
+        return path if path.is_file() or not pieces_of_frame(path).is_file() else pieces_of_frame(path)
 
     def add(self, time: float, point_data: Mapping[str, np.ndarray], cell_data: Mapping[str, np.ndarray]) -> None:
         """Write a frame, then name it in the PVD file, while the caller goes on; see :meth:`flush`.
@@ -66,11 +66,30 @@ class Series:
         stored in single precision, flags as bytes.
         """
         self.flush()
-        points = {name: _field(values) for name, values in point_data.items()}
-        cells = {name: [_field(values)] for name, values in cell_data.items()}
-        mesh = meshio.Mesh(self._points, self._cells, points, cells)
+        mesh = frame_mesh(self.space, point_data, cell_data)
         self.times.append(float(time))
         self._pending = self._writer.submit(self._write, self.frame(len(self.times) - 1), mesh)
+
+    def add_pieces(self, time: float, count: int, write: Callable[[Path], list[str]]) -> None:
+        """Write a frame in `count` pieces: `write` gets the folder for them, and gives the XML of :func:`write_piece`.
+
+        Raises
+        ------
+        OutputError
+            One could not be written.
+        """
+        self.flush()
+        path = self.folder / frame_file(self.name, len(self.times))
+        pieces = path.with_suffix("")
+        with reported(f"cannot write {pieces}"):
+            pieces.mkdir(exist_ok=True)
+        lines = write(pieces)
+        sources = [f'<Piece Source="{pieces.name}/{piece_file(rank)}"/>' for rank in range(count)]
+        write_atomic(pieces_of_frame(path), "\n".join([
+            '<?xml version="1.0"?>', '<VTKFile type="PUnstructuredGrid" version="0.1" byte_order="LittleEndian">',
+            '<PUnstructuredGrid GhostLevel="0">', *lines, *sources, "</PUnstructuredGrid>", "</VTKFile>"]) + "\n")
+        self.times.append(float(time))
+        self._write_index()
 
     def flush(self) -> None:
         """Wait until every frame is written.
@@ -123,8 +142,9 @@ class Series:
         self.flush()
         self.times = self.check(n)
         self._write_index()
-        while self.frame(n).is_file():
-            self.frame(n).unlink()
+        while (path := self.frame(n)).is_file():
+            path.unlink()
+            shutil.rmtree(path.with_suffix(""), ignore_errors=True)
             n += 1
 
     def _write_index(self) -> None:
@@ -134,6 +154,41 @@ class Series:
             ET.SubElement(collection, "DataSet", timestep=repr(time), group="", part="0", file=self.frame(i).name)
         ET.indent(root, " ")
         write_atomic(self.path, '<?xml version="1.0"?>\n' + ET.tostring(root, "unicode") + "\n")
+
+
+def frame_mesh(space: Space, point_data: Mapping[str, np.ndarray], cell_data: Mapping[str, np.ndarray]) -> meshio.Mesh:
+    """The undeformed body with fields, as :meth:`Series.add` takes them."""
+    kind = "quad" if space.dim == 2 else "hexahedron"
+    return meshio.Mesh(_vectors(space.X), [(kind, space.conn[:, VTK_ORDER[space.dim]].astype("i4"))],
+                       {name: _field(values) for name, values in point_data.items()},
+                       {name: [_field(values)] for name, values in cell_data.items()})
+
+
+def piece_file(rank: int) -> str:
+    """Name of the piece of a rank in the folder of a frame."""
+    return f"{rank:04d}.vtu"
+
+
+def write_piece(folder: Path, rank: int, mesh: meshio.Mesh) -> list[str]:
+    """Write the piece of a rank; returns what a PVTU file says of its arrays.
+
+    Raises
+    ------
+    OutputError
+        It cannot be written.
+    """
+    with replaced(folder / piece_file(rank)) as part:
+        meshio.write(part, mesh, "vtu", compression="zlib")
+    lines = ["<PPoints>", _array("", mesh.points), "</PPoints>", "<PPointData>",
+             *(_array(name, values) for name, values in mesh.point_data.items()), "</PPointData>", "<PCellData>",
+             *(_array(name, values[0]) for name, values in mesh.cell_data.items()), "</PCellData>"]
+    return lines
+
+
+def _array(name: str, values: np.ndarray) -> str:
+    kind = {"f": "Float", "i": "Int", "u": "UInt"}[values.dtype.kind] + str(8 * values.dtype.itemsize)
+    components = f' NumberOfComponents="{values.shape[1]}"' if values.ndim == 2 else ""
+    return f'<PDataArray type="{kind}" Name="{name or "Points"}"{components}/>'
 
 
 def frame_times(path: Path) -> list[float]:

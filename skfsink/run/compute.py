@@ -8,7 +8,7 @@ import shlex
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from copy import deepcopy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ from typing import Any
 from ..errors import CheckpointError, Interrupted, ParameterError, first_line
 from ..fields.state import State
 from ..meshing.kept_mesh import MESH, keep_mesh
-from ..methods.ranks.integrator import ranks_text
+from ..methods.ranks.integrator import RankOptions, ranks_text
 from ..methods.ranks.integrator import refuse as refuse_on_ranks
 from ..pictures.of_a_run import draw_comparison, draw_run
 from ..results.history import History
@@ -99,7 +99,8 @@ def run_case(case: Case, arguments: dict[str, Any], options: Options) -> Result:
         with Display(options.quiet) as display:
             if request.model_choice:
                 display.say(request.model_choice["text"])
-            job = _Job(request.folder, display, request.resumes, options.observers, request.notes)
+            job = _Job(request.folder, display, request.resumes, options.observers, request.notes,
+                       ranks=RankOptions(options.partition, options.frame_pieces))
             return _compute(request.scene(), job, request.options.overwrite, partial(_with_corridor, request))
     except (Interrupted, KeyboardInterrupt):
         begun = (request.folder / SCENE).exists()
@@ -126,6 +127,7 @@ class _Job:
     observers: tuple[Observer, ...] = ()
     notes: tuple[str, ...] = ()
     made_in_python: tuple[str, ...] = ()
+    ranks: RankOptions = field(default_factory=RankOptions)
 
     def part(self, analysis: str, resumes: bool) -> _Job:
         """That of one of both analyses, with observers of its own."""
@@ -177,7 +179,7 @@ def _check(scene: Scene, job: _Job) -> None:
     if both:
         _copied(job.observers)
     check_memory(scene, job.display)
-    refuse_on_ranks(scene, scene.controls.analysis, scene.controls.integrator)
+    refuse_on_ranks(scene, scene.controls.analysis, scene.controls.integrator, job.ranks.partition)
     if not job.resumes:
         refuse(scene)
 
@@ -265,7 +267,7 @@ def _onset(folder: Path, fingerprint: str, observers: Sequence[Observer]) -> Loa
 
 def _run_one(scene: Scene, job: _Job, onset: Loaded | None = None) -> Result:
     """The run of a scene of one analysis, from `onset` on if there is one."""
-    simulation = Simulation(scene, job.folder, job.display, job.resumes, job.observers)
+    simulation = Simulation(scene, job.folder, job.display, job.resumes, job.observers, job.ranks)
     with simulation.notes:
         for note in job.notes:
             log.warning(note)

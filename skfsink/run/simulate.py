@@ -16,7 +16,7 @@ from ..fem.direct import one_thread_of_openblas
 from ..fields.body import Body
 from ..fields.state import State
 from ..methods.integrators import Integrator
-from ..methods.ranks.integrator import InParts, integrator_of
+from ..methods.ranks.integrator import InParts, RankOptions, integrator_of
 from ..methods.rest import LoadingFromRest
 from ..methods.statics import Statics
 from ..scene.scene import Scene
@@ -63,6 +63,7 @@ class Simulation:
     display: what the person sees.
     resume: take up the run where the checkpoint in `folder` left it.
     observers: a user's, beside those of every run or in their place; see :class:`.Observer`.
+    ranks: what several ranks are asked for.
 
     Raises
     ------
@@ -78,14 +79,14 @@ class Simulation:
     ONSET = "onset.npz"
 
     def __init__(self, scene: Scene, folder: Path, display: Display, resume: bool = False,
-                 observers: Sequence[Observer] = ()) -> None:
+                 observers: Sequence[Observer] = (), ranks: RankOptions = RankOptions()) -> None:  # noqa: B008
         # a checkpoint that cannot be used is refused before any file is touched
         stored = load_checkpoint(folder / self.CHECKPOINT, scene.fingerprint) if resume else None
         if stored and "run" not in stored.memories:
             path = folder / self.CHECKPOINT
             raise CheckpointError(f"the checkpoint {path} is damaged: it is a state without its run")
         memory = stored.memories.pop("run") if stored else {}
-        self.scene, self.folder, self.display = scene, folder, display
+        self.scene, self.folder, self.display, self._ranks = scene, folder, display, ranks
         self.body = Body.of(scene)
         self.momentum, self.density, self.free = self.body.momentum, self.body.density, self.body.free
         self.statics = Statics(self.body, scene.controls.statics)
@@ -213,7 +214,7 @@ class Simulation:
             self._from_rest = LoadingFromRest(self.body, c.hht)
             self.integrator = self._from_rest.integrator
         else:
-            self.integrator = self.view.integrator = integrator_of(c.integrator, self.body, c)
+            self.integrator = self.view.integrator = integrator_of(c.integrator, self.body, c, self._ranks)
         return self.integrator
 
     def _integrate(self) -> None:

@@ -33,7 +33,8 @@ __all__ = ["Deck", "read_deck"]
 
 #: keys of a deck; the last four a run says of itself
 TOP = ("case", "parameters", "source", "assumed", "choice", "made_in_python")
-OUTPUT = ("out", "overwrite", "quiet", "resume", "observers")  # options of a run, which no deck has
+OUTPUT = ("out", "overwrite", "quiet", "resume", "partition", "frame_pieces",
+          "observers")  # options of a run, which no deck has
 LARGEST = 1_000_000  # bytes
 
 
@@ -46,7 +47,7 @@ class Deck:
 
     def run(self, **output: Any) -> Any:
         """Run it, to a :class:`.Result`; `output` are options that no deck has: out, overwrite, quiet, resume,
-        observers.
+        partition, frame_pieces, observers.
 
         Raises
         ------

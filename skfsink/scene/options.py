@@ -31,7 +31,8 @@ from .schedule import check_observers
 __all__ = ["LAYOUTS", "NOT_PHYSICS", "OUTSIDE_A_DECK", "QUANTITIES", "SAMPLE", "Options"]
 
 #: options that say where a run goes, or are set by the run itself
-OUTSIDE_A_DECK = ("out", "resume", "overwrite", "quiet", "observers", "corridor", "kept_mesh", "given_names")
+OUTSIDE_A_DECK = ("out", "resume", "overwrite", "quiet", "partition", "frame_pieces", "observers", "corridor",
+                 "kept_mesh", "given_names")
 #: options that are no part of a scene: those, and how its model was chosen
 NOT_PHYSICS = ("model", "tolerance", "quantity", *OUTSIDE_A_DECK)
 LAYOUTS = ("corridor", "uniform", "two-pass")
@@ -188,6 +189,10 @@ class Options:
         Use an output folder that is not empty.
     quiet
         Show no progress.
+    partition
+        Folder with the parts of the body, a file for each rank of MPI, that `skfsink partition` has made.
+    frame_pieces
+        Let each rank of MPI write its piece of a frame, in a .vtu file of its own beside a .pvtu file.
     corridor
         Mesh that the first of two passes has left; set by the run.
     kept_mesh
@@ -253,13 +258,15 @@ class Options:
     resume: Annotated[Path | None, OUTPUT] = None
     overwrite: Annotated[bool, OUTPUT, FLAG] = False
     quiet: Annotated[bool, OUTPUT, FLAG] = False
+    partition: Annotated[Path | None, OUTPUT] = None
+    frame_pieces: Annotated[bool, OUTPUT, FLAG] = False
     corridor: Annotated[Path | None, Parameter(parse=False)] = None
     kept_mesh: Annotated[Path | None, Parameter(parse=False)] = None
     given_names: Annotated[frozenset[str], Parameter(parse=False)] = frozenset()
     observers: Annotated[tuple[Any, ...], Parameter(parse=False)] = ()
 
     def __post_init__(self) -> None:
-        for name in ("out", "resume", "corridor", "kept_mesh"):
+        for name in ("out", "resume", "partition", "corridor", "kept_mesh"):
             if (folder := getattr(self, name)) is not None:
                 object.__setattr__(self, name, path_of(name, folder))
         object.__setattr__(self, "observers", check_observers(self.observers))

@@ -33,8 +33,9 @@ def monotone_laplacian(space: Space, pattern: Pattern, coefficient: float) -> np
     data = np.zeros(pattern.nnz)
     rules = [shape_functions(points(space.dim, ends)) for ends in range(1, 2**space.dim)]
     N, gradients = (np.array(values) for values in zip(*rules))
-    _laplacian(space.X[space.conn], space.dN, (space.w, space.dX), (N, gradients, space.axisymmetric), coefficient,
-               pattern.slot, data)
+    for some in space.chunks():
+        _laplacian(space.X[space.conn[some]], space.slopes(some), (space.w[some], space.dX[some]),
+                   (N, gradients, space.axisymmetric), coefficient, pattern.slots(some), data)
     return data
 
 

@@ -1,4 +1,4 @@
-"""What the loops for second derivatives take of a body: all of it at once, or the elements of one region in pieces."""
+"""What the loops for second derivatives take of a body, some elements at a time."""
 
 from __future__ import annotations
 
@@ -12,29 +12,28 @@ from .records import Piece
 
 __all__ = ["pieces"]
 
-PIECE = 4096  # elements whose data is copied at a time
+PIECE = 1024  # elements whose data is made at a time
 
 
 def pieces(space: Space, pattern: Pattern, gamma: np.ndarray, elements: np.ndarray | None,
            fibres: np.ndarray | None = None) -> Iterator[Piece]:
-    """Data of the `elements`, some at a time; of all (None) without a copy.
+    """Data of the `elements`, or of all (None), some at a time.
 
     `gamma` (ne, nq) is numbered over the whole body, as the arrays of `space` are; `fibres` over `elements`.
     """
+    count = space.n_elements if elements is None else elements.size
     if fibres is None:
-        fibres = np.empty((space.n_elements if elements is None else elements.size, 0, 3))
-    whole = space.conn, space.dN, space.w, np.ascontiguousarray(gamma), pattern.slot
-    around = space.around if space.axisymmetric else np.empty((space.n_elements, 0, space.conn.shape[1]))
-    if elements is None:
-        yield Piece(*whole, np.ascontiguousarray(fibres), around)
-        return
-    for start in range(0, elements.size, PIECE):
-        part = slice(start, start + PIECE)
-        conn, dN, w, at_points, slot = (_taken(array, elements[part]) for array in whole)
-        yield Piece(conn, dN, w, at_points, slot, np.ascontiguousarray(fibres[part]), around[elements[part]])
+        fibres = np.empty((count, 0, 3))
+    gamma = np.ascontiguousarray(gamma)
+    for start in range(0, count, PIECE):
+        part = slice(start, min(start + PIECE, count))
+        some = part if elements is None else elements[part]
+        around = space.around[some] if space.axisymmetric else np.empty((part.stop - start, 0, space.conn.shape[1]))
+        yield Piece(_taken(space.conn, some), space.slopes(some), _taken(space.w, some), _taken(gamma, some),
+                    pattern.slots(some), np.ascontiguousarray(fibres[part]), around)
 
 
-def _taken(array: np.ndarray, rows: np.ndarray) -> np.ndarray:
+def _taken(array: np.ndarray, rows: np.ndarray | slice) -> np.ndarray:
     """Rows of an array, read-only if it is: the compiled loops are not compiled again for them."""
     taken: np.ndarray = array[rows]
     taken.flags.writeable = array.flags.writeable

@@ -14,7 +14,8 @@ __all__ = ["laplacian", "mass", "weighted_mass"]
 def laplacian(space: Space, pattern: Pattern, coefficient: float) -> np.ndarray:
     """Data of  int coefficient Grad N_a . Grad N_b  on a scalar pattern (first term of Eq. 24)."""
     data = np.zeros(pattern.nnz)
-    _laplacian(space.dN, space.w, coefficient, pattern.slot, data)
+    for some in space.chunks():
+        _laplacian(space.slopes(some), space.w[some], coefficient, pattern.slots(some), data)
     return data
 
 
@@ -31,7 +32,9 @@ def mass(space: Space, pattern: Pattern, gamma: np.ndarray, rho0: float | np.nda
     `rho0` [t/mm^3] is a number, or one for each element, (ne, 1).
     """
     data = np.zeros(pattern.nnz)
-    _mass(space.N, space.w, gamma * rho0, space.dim, pattern.slot, data)
+    weight = gamma * rho0
+    for some in space.chunks():
+        _mass(space.N, space.w[some], weight[some], space.dim, pattern.slots(some), data)
     return data
 
 

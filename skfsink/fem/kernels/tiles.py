@@ -71,13 +71,10 @@ class Tiles:
     def __init__(self, space: Space, plane_stress: bool = False, threads: int = 1,
                  parts: Sequence[tuple[np.ndarray | None, np.ndarray | None]] = ((None, None),)) -> None:
         self.space = space
-        ne, na, dim = space.n_elements, space.conn.shape[1], space.dim
+        na, dim = space.conn.shape[1], space.dim
         self.lanes = LANES if dim == 2 else LANES_3D
         ends = self._arrange([elements for elements, _ in parts])
-        around = [1.0 / (space.X[space.conn, 0] @ space.N.T)[:, :, None]] if space.axisymmetric else []
-        geometry = np.concatenate([space.invJ.reshape(ne, na, dim * dim), space.w[:, :, None], *around], axis=2)
-        self.conn = self.tile(space.conn).astype(np.uint32)
-        self.geometry = self.tile(geometry.transpose(0, 2, 1).reshape(ne, -1))  # by component, then Gauss point
+        self.conn, self.geometry = self.tile(space.nodes), self._geometry()
         self.gamma = np.zeros((self.count, na, self.lanes))
         self.W = np.zeros((self.count, na, self.lanes))
         self.psi = np.zeros((self.count, self.lanes))
@@ -118,6 +115,20 @@ class Tiles:
                 self._element[first * lanes:end * lanes] = elements[-1]
                 self._element[self._place[elements]] = elements
         return ends
+
+    def _geometry(self) -> np.ndarray:
+        """See :class:`.Elements`: by component, then Gauss point."""
+        space, lanes, made = self.space, self.lanes, 512  # tiles at a time
+        element = np.minimum(np.arange(self.count * lanes), space.n_elements - 1) if self._element is None else (
+            self._element)
+        out: np.ndarray = np.empty((self.count, space.w.shape[1] * (space.dim**2 + 1 + space.axisymmetric), lanes))
+        for tile in range(0, self.count, made):
+            some = element[tile * lanes:(tile + made) * lanes]
+            around = [1.0 / (space.X[space.conn[some], 0] @ space.N.T)[:, :, None]] if space.axisymmetric else []
+            inverse = space.inverse(some).reshape(some.size, -1, space.dim**2)
+            rows = np.concatenate([inverse, space.w[some][:, :, None], *around], axis=2)
+            out[tile:tile + made] = _in_tiles(rows.transpose(0, 2, 1).reshape(some.size, -1), lanes)
+        return out
 
     def tile(self, values: np.ndarray) -> np.ndarray:
         """(ne, rows) as tiles (count, rows, lanes)."""

@@ -11,31 +11,36 @@ import os
 import signal
 import sys
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn, TypeVar, cast
 
 import numpy as np
 
-from ...errors import SkfsinkError
+from ...errors import OutputError, ParameterError, SkfsinkError
 from ...fields.state import State
+from ...fields.stress import cauchy_stress
 from ...system.peak import peak_rss_mb
 from ..explicit import Explicit
 from .mpi import MPIExchange, wait
 from .part import ELEMENTAL, NODAL, PartOfBody, state_of
+from .partition import Numbers
 
 if TYPE_CHECKING:
     from mpi4py import MPI
 
 __all__ = ["Crew", "Member", "lead"]
 
+T = TypeVar("T")
 IDLE = 1e-3    # s without a task, after which a rank looks for one less often
 UNEXPECTED = 1  # exit status of a program that ends by a mistake of its own
 #: what the first rank asks of all: to take something that it gives, to do something, to give something back
 GIVEN, DONE, COLLECTED = ("take", "begin", "restore"), ("step", "sync", "share"), ("new_deletions", "memory", "peak")
-TASKS = (*GIVEN, *DONE, *COLLECTED, "gather", "end")
+TASKS = (*GIVEN, *DONE, *COLLECTED, "gather", "each", "end")
+#: of the elements, at the last force: W, gamma at Gauss points, Cauchy stress, and whether none is defined
+EVALUATED = ("W", "points", "stress", "crushed")
 #: fields that can be gathered
-FIELDS = (*NODAL, *ELEMENTAL, "reaction", "kept_volume")
+FIELDS = (*NODAL, *ELEMENTAL, *EVALUATED, "reaction", "kept_volume")
 
 
 def lead(comm: MPI.Intracomm, program: Callable[[], object]) -> NoReturn:
@@ -69,12 +74,29 @@ class Member:
         self.part: PartOfBody | None = None
 
     def take(self, part: PartOfBody) -> None:
-        """Take up a part of the body."""
+        """Take up a part of the body; ParameterError on all ranks if one of them cannot read its."""
+        part = self.agreed(lambda: part.read(self.comm.rank), ParameterError)
         self.part, self.body = part, part.body(self.comm)
         self.explicit = Explicit(self.body, part.controls)
         assert isinstance(self.body.space.exchange, MPIExchange)
         self.exchange = self.body.space.exchange
         self.logged = 0
+
+    def agreed(self, does: Callable[[], T], kind: type[SkfsinkError]) -> T:
+        """What `does` returns; what goes wrong on one rank goes wrong on all, as an error of a `kind`."""
+        said, value = "", None
+        try:
+            value = does()
+        except kind as error:
+            said = str(error)
+        if failures := [text for text in self.comm.allgather(said) if text]:
+            raise kind(failures[0])
+        return cast(T, value)
+
+    def each(self, task: tuple[Callable[..., T], tuple[Any, ...]]) -> T:
+        """What a function returns for this rank, and further arguments; OutputError on all if it is one's."""
+        function, arguments = task
+        return self.agreed(lambda: function(self, *arguments), OutputError)
 
     def begin(self, state: State) -> None:
         """Set the part in motion."""
@@ -105,6 +127,12 @@ class Member:
             return self.body.momentum.memory().get(name)
         if name == "reaction":
             return self.explicit.reaction[:self.part.numbers.counted]
+        if name in EVALUATED:
+            momentum = self.body.momentum
+            if name in ("W", "points"):
+                return momentum.W if name == "W" else momentum.gamma
+            stress = cauchy_stress(momentum, self.state.u)
+            return stress if name == "stress" else np.isnan(stress).any(axis=1)
         value: np.ndarray | None = getattr(self.state, name)
         return value if value is None or name in ELEMENTAL else value[:self.part.numbers.counted]
 
@@ -147,9 +175,14 @@ class Crew:
     def _ask(self, task: str, detail: int = 0) -> None:
         wait(self.comm.Ibcast(np.array([TASKS.index(task), detail], np.int64)))
 
-    def _give(self, task: str, items: Sequence[tuple[Any, ...]]) -> None:
+    def _give(self, task: str, items: Iterable[tuple[Any, ...]]) -> None:
+        """Items are made, sent and forgotten one by one: all of them may be as large as the body."""
+        items = iter(items)
+        own = next(items)  # what cannot be made is told before the others wait for it
         self._ask(task)
-        getattr(self.member, task)(*self.comm.scatter(items))
+        for rank, item in enumerate(items, 1):
+            self.comm.send(item, rank)
+        getattr(self.member, task)(*own)
 
     def _do(self, task: str) -> Any:
         self._ask(task)
@@ -159,20 +192,27 @@ class Crew:
         self._ask(task)
         return self.comm.gather(getattr(self.member, task)()) or []
 
-    def take(self, parts: list[PartOfBody]) -> None:
+    def take(self, parts: Iterable[PartOfBody]) -> None:
         """Give every rank its part."""
-        self.numbers = [part.numbers for part in parts]
-        followers = [part.loading.followers for part in parts]
-        self.facets = [np.zeros(0, np.int64) if loads is None else loads.places for loads in followers]
-        self._give("take", [(part,) for part in parts])
+        self.numbers: list[Numbers] = []
+        self.facets: list[np.ndarray] = []  # that pressures act on, by their numbers in the whole
+
+        def each() -> Iterator[tuple[PartOfBody]]:
+            for part in parts:
+                followers = part.loading.followers
+                self.numbers.append(part.numbers)
+                self.facets.append(np.zeros(0, np.int64) if followers is None else followers.places)
+                yield (part,)
+
+        self._give("take", each())
 
     def begin(self, state: State) -> None:
         """Set the body in motion from a state of the whole."""
-        self._give("begin", [(state_of(state, part),) for part in self.numbers])
+        self._give("begin", ((state_of(state, part),) for part in self.numbers))
 
     def restore(self, state: State, memories: list[dict[str, np.ndarray]]) -> None:
         """Go on from a state of the whole, and what the integrator of each part remembers."""
-        self._give("restore", [(state_of(state, part), memory) for part, memory in zip(self.numbers, memories)])
+        self._give("restore", ((state_of(state, part), memory) for part, memory in zip(self.numbers, memories)))
 
     def step(self) -> None:
         """One step of all."""
@@ -201,16 +241,26 @@ class Crew:
     def gather(self, name: str) -> np.ndarray | None:
         """A field of the whole body, one of :data:`FIELDS`."""
         self._ask("gather", FIELDS.index(name))
-        parts = self.comm.gather(self.member.field(name))
-        assert parts is not None
-        if parts[0] is None:
+        own = self.member.field(name)
+        if own is None:
             return None
         places = (self.facets if name == "kept_volume" else
-                  [n.elements if name in ELEMENTAL else n.nodes[:n.counted] for n in self.numbers])
-        whole: np.ndarray = np.empty((sum(place.size for place in places), *parts[0].shape[1:]), parts[0].dtype)
-        for place, values in zip(places, parts):
+                  [n.nodes[:n.counted] if name in (*NODAL, "reaction") else n.elements for n in self.numbers])
+        whole: np.ndarray = np.empty((sum(place.size for place in places), *own.shape[1:]), own.dtype)
+        whole[places[0]] = own
+        for rank, place in enumerate(places[1:], 1):
+            values = np.empty((place.size, *own.shape[1:]), own.dtype)
+            wait(self.comm.Irecv(values, rank))
             whole[place] = values
         return whole
+
+    def each(self, function: Callable[..., T], *arguments: Any) -> T:
+        """Let every rank call a function that can be imported, with its :class:`Member` and `arguments`.
+
+        Returns what it gave on the first one. OutputError if it was one's.
+        """
+        self._ask("each")
+        return self.member.each(self.comm.bcast((function, arguments)))
 
     def end(self) -> None:
         """Let all others go."""
@@ -241,10 +291,13 @@ class Crew:
     def _serve(self, task: str, detail: int) -> None:
         member, comm = self.member, self.comm
         if task in GIVEN:
-            getattr(member, task)(*comm.scatter(None))
+            getattr(member, task)(*comm.recv(source=0))
         elif task in COLLECTED:
             comm.gather(getattr(member, task)())
+        elif task == "each":
+            member.each(comm.bcast(None))
         elif task == "gather":
-            comm.gather(member.field(FIELDS[detail]))
+            if (values := member.field(FIELDS[detail])) is not None:
+                wait(comm.Isend(np.ascontiguousarray(values), 0))
         else:
             getattr(member, task)()

@@ -2,32 +2,50 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
+from ...errors import ParameterError
 from ...fields.body import Body, BodyScene
 from ...fields.state import State
 from ..controls import EventControls
 from ..integrators import INTEGRATORS, Integrator
 from .crew import Crew
+from .gathered import Gathered
 from .part import check_parts, parts_of
+from .parted import Parted
 from .partition import check_ranks
 from .world import world
 
-__all__ = ["InParts", "integrator_of", "ranks_text", "refuse"]
+__all__ = ["InParts", "RankOptions", "integrator_of", "ranks_text", "refuse"]
 
+T = TypeVar("T")
 MOVING, DENSITY = ("u", "v", "a", "W_max"), ("gamma", "sink")
 NODAL = {"reaction", "viscous"}  # of the memory of an integrator
 
 
-def integrator_of(name: str, body: Body, controls: EventControls) -> Integrator:
+class RankOptions(NamedTuple):
+    """What a run on several ranks can be asked for.
+
+    Attributes
+    ----------
+    partition: folder with the parts of the body; None cuts it.
+    frame_pieces: whether each rank writes its piece of a frame.
+    """
+
+    partition: Path | None = None
+    frame_pieces: bool = False
+
+
+def integrator_of(name: str, body: Body, controls: EventControls, options: RankOptions = RankOptions()) -> Integrator:  # noqa: B008
     """The integrator of an event: that of a body in parts where there are several ranks, and it has one."""
     comm = world()
     if comm is None or name != "explicit":
         return INTEGRATORS[name].of(body, controls)
-    return InParts(body, controls, Crew(comm))
+    return InParts(body, controls, Crew(comm), options)
 
 
 def ranks_text(analysis: str, integrator: str) -> str:
@@ -40,28 +58,44 @@ def ranks_text(analysis: str, integrator: str) -> str:
     return f"{comm.size} ranks: one computes all of it, the others wait; parts know the explicit event alone"
 
 
-def refuse(scene: BodyScene, analysis: str, integrator: str) -> None:
-    """Refuse an event that the ranks that there are cannot compute, before the body is loaded (ParameterError)."""
+def refuse(scene: BodyScene, analysis: str, integrator: str, parted: Path | None = None) -> None:
+    """Refuse an event that the ranks that there are cannot compute, before the body is loaded (ParameterError).
+
+    The same of parts in a folder that are not those of this mesh for these ranks.
+    """
     comm = world()
+    if parted is not None:
+        if analysis == "quasistatic" or integrator != "explicit":
+            raise ParameterError("a partition is for an explicit event, and this run has none: leave partition out")
+        Parted(parted).check(scene.space, 1 if comm is None else comm.size)
     if comm is not None and analysis != "quasistatic" and integrator == "explicit":
         check_ranks(comm.size, scene.space.n_elements)
         check_parts(scene.space, scene.loading(), scene.controls)
 
 
+def _is_light(body: Body) -> bool:
+    """Whether all that is asked of the momentum balance of a body can be fetched from its parts."""
+    momentum = body.momentum
+    return momentum.dead is None and momentum.followers is None and momentum.contact is None
+
+
 class InParts:
     """See :class:`.Integrator` and :class:`.Explicit`.
 
-    What changes in the parts is fetched when it is asked for: fields of the state, the reaction, and with the
-    displacement what the momentum balance of the whole body knows at it.
+    What changes in the parts is fetched when it is asked for: fields of the state, the reaction, stresses, and what the
+    momentum balance of the whole body knows; of this no more is kept than that takes (see :class:`.Gathered`).
 
     Memory: that of all ranks: after `begin` or `restore`, `run`, `sync` and `reaction` are of the state last stepped.
     """
 
     factorisations = 0
 
-    def __init__(self, body: Body, controls: EventControls, crew: Crew) -> None:
-        self.body, self.crew = body, crew
-        crew.take(parts_of(body, controls.explicit, crew.size))
+    def __init__(self, body: Body, controls: EventControls, crew: Crew, options: RankOptions = RankOptions()) -> None:  # noqa: B008
+        self.body, self.crew, self.options = body, crew, options
+        parted = None if options.partition is None else Parted(options.partition)
+        self._gathered = Gathered(body.momentum, self._fetch) if _is_light(body) else None
+        body.release()
+        crew.take(parts_of(body, controls.explicit, crew.size, parted))
         self._own, self._reaction = crew.member.explicit, np.zeros((0, 0))
         self._state: State | None = None
 
@@ -97,6 +131,18 @@ class InParts:
     def solves(self) -> int:
         """Solves for gamma in the parts."""
         return self._own.density.solves
+
+    def stress(self) -> np.ndarray:
+        """Mean Cauchy stress of the elements [MPa], (ne, 6), as the parts find it."""
+        return self._fetch("stress")
+
+    def crushed(self) -> np.ndarray:
+        """Mask of the elements that no stress is defined for, (ne,)."""
+        return self._fetch("crushed")
+
+    def each(self, function: Callable[..., T], *arguments: Any) -> T:
+        """See :meth:`.Crew.each`."""
+        return self.crew.each(function, *arguments)
 
     def cost(self) -> dict[str, Any]:
         """What each rank has used of memory [MB], and how often they have told each other something.
@@ -140,15 +186,19 @@ class InParts:
             new = self.crew.new_deletions()
             state.deletions.extend(new)
             state.deleted[[element for _, element in new]] = True
-        self.body.momentum.least_J = self.crew.member.body.momentum.least_J
+        whole, part_momentum = self.body.momentum, self.crew.member.body.momentum
+        whole.least_J = part_momentum.least_J
         self._reaction, self._state = np.zeros((0, 0)), state
+        if self._gathered is not None:
+            whole.energy = part_momentum.energy
+            self._gathered.now(state)
 
     def _fetch(self, name: str) -> Any:
         if name == "W_max":
             self.crew.sync()
         value = self.crew.gather(name)
-        if name == "u" and self._state is not None and value is not None:  # for those who look at stresses and energies
-            momentum = self.body.momentum
+        if name == "u" and self._gathered is None and self._state is not None and value is not None:
+            momentum = self.body.momentum  # for those who look at stresses and energies
             momentum.set_time(self._state.grip)
             if (kept := self.crew.gather("kept_volume")) is not None:  # below what has failed, which the parts know
                 momentum.restore({**momentum.memory(), "kept_volume": kept})
@@ -192,7 +242,8 @@ class InParts:
                 memories[-1][name] = memory[name][part.nodes]
             if "kept_volume" in memory:
                 memories[-1]["kept_volume"] = memory["kept_volume"][facets]
-        self.body.momentum.restore(memory)
-        self.body.take(state)
+        if self._gathered is None:
+            self.body.momentum.restore(memory)
+            self.body.take(state)
         self.crew.restore(state, memories)
         self._renew(state, False)

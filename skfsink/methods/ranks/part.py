@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,7 +22,8 @@ from ...material import Material, SinkLaw
 from ...material.regions import Region
 from ..controls import ExplicitControls
 from .mpi import MPIExchange
-from .partition import Numbers, numbers, partition
+from .parted import Parted
+from .partition import Numbers, mesh_of, numbers, partition
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -39,13 +40,14 @@ class PartOfBody:
 
     Attributes
     ----------
-    mesh: elements and nodes of the part.   n_nodes: of the whole body.
+    mesh: elements and nodes of the part, None of one that is read.   n_nodes: of the whole body.
+    parted: the files it is read from, if it is.
     momentum, density: further arguments of the balances.
     """
 
     numbers: Numbers
     n_nodes: int
-    mesh: skfem.Mesh
+    mesh: skfem.Mesh | None
     axisymmetric: bool
     material: Material
     sink_law: SinkLaw
@@ -55,6 +57,14 @@ class PartOfBody:
     loading: Loading
     deletion: float
     controls: ExplicitControls
+    parted: Parted | None = None
+
+    def read(self, number: int) -> PartOfBody:
+        """With its mesh, as part `number` of the files; ParameterError if they cannot be read."""
+        if self.parted is None:
+            return self
+        own, mesh = self.parted.part(number)
+        return replace(self, numbers=own, mesh=mesh)
 
     def body(self, comm: MPI.Intracomm) -> Body:
         """The part as a body whose balances tell the others what they have to."""
@@ -76,30 +86,29 @@ def check_parts(space: Space, loading: Loading, controls: BodyControls) -> None:
     loading.of_part(Selection(none, none, space.n_elements, space.n_nodes))
 
 
-def parts_of(body: Body, controls: ExplicitControls, ranks: int) -> list[PartOfBody]:
-    """The parts of a body, one for each rank.
+def parts_of(body: Body, controls: ExplicitControls, ranks: int, parted: Parted | None = None) -> Iterator[PartOfBody]:
+    """The parts of a body, one for each rank, made as they are asked for; of `parted` each rank reads its mesh.
 
     Raises
     ------
     ParameterError
-        There are more ranks than elements.
+        There are more ranks than elements, or a file of a part cannot be read.
     """
     space, momentum, density = body.space, body.momentum, body.density
-    found = []
-    for part in numbers(space.conn, partition(space.conn, ranks)):
+    made = numbers(space.conn, partition(space.conn, ranks)) if parted is None else []
+    for number in range(ranks):
+        part = made[number] if parted is None else parted.numbers(number)
+        mesh = mesh_of(space, part) if parted is None else None
         selection = Selection(part.elements, part.nodes, space.n_elements, space.n_nodes)
-        mesh = type(space.mesh)(np.ascontiguousarray(space.X[part.nodes].T),
-                                np.ascontiguousarray(selection.node[space.mesh.t[:, part.elements]]))
         absent = np.flatnonzero(np.isin(part.elements, density.absent))
-        found.append(PartOfBody(
+        yield PartOfBody(
             part, space.n_nodes, mesh, space.axisymmetric, momentum.material, density.law,
             _regions(body, part.elements),
             {"element": momentum.element, "force_floor": momentum.force_floor,
              "bulk_viscosity": BulkViscosity(*momentum.bulk_viscosity)},
             {"sink": density.sink, "unchanged": density.unchanged, "gradient": density.gradient, "absent": absent,
-             "active_zone": density.zone is not None},
-            body.loading.of_part(selection), body.deletion, controls))
-    return found
+             "active_zone": density.active_zone},
+            body.loading.of_part(selection), body.deletion, controls, parted)
 
 
 def _regions(body: Body, elements: np.ndarray) -> tuple[Region, ...]:

@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import skfem
 from scipy.sparse import csr_array
 
 from ...errors import ParameterError
+from ...fem.space import Space
 
-__all__ = ["Numbers", "check_ranks", "numbers", "partition"]
+__all__ = ["Numbers", "check_ranks", "mesh_of", "numbers", "partition"]
 
 
 @dataclass(frozen=True)
@@ -71,17 +73,28 @@ def _without_holes(part: np.ndarray, parts: int) -> np.ndarray:
 
 def numbers(conn: np.ndarray, part: np.ndarray) -> list[Numbers]:
     """What each part of :func:`partition` has."""
-    n, parts = int(conn.max()) + 1, int(part.max()) + 1
-    has = np.zeros((parts, n), bool)
-    for p in range(parts):
-        has[p, conn[part == p]] = True
-    owner = has.argmax(axis=0)
+    n, parts, na = int(conn.max()) + 1, int(part.max()) + 1, conn.shape[1]
+    pairs = np.unique(conn.ravel() * parts + np.repeat(part, na))  # nodes with their parts, both ascending
+    node, of = np.divmod(pairs, parts)
+    start = np.searchsorted(node, np.arange(n + 1))
+    owner, several = of[start[:-1]], np.diff(start) > 1
     found = []
     for p in range(parts):
-        own, other = np.flatnonzero(has[p] & (owner == p)), np.flatnonzero(has[p] & (owner != p))
-        nodes = np.concatenate([own, other])
+        has = node[of == p]
+        nodes = np.concatenate([has[owner[has] == p], has[owner[has] != p]])
         here = np.full(n, -1)
         here[nodes] = np.arange(nodes.size)
-        shared = {q: here[both] for q in range(parts) if q != p and (both := np.flatnonzero(has[p] & has[q])).size}
-        found.append(Numbers(np.flatnonzero(part == p), nodes, own.size, shared))
+        between = has[several[has]]
+        others = np.concatenate([np.zeros(0, np.int64), *(of[start[i]:start[i + 1]] for i in between)])
+        with_them = np.repeat(between, np.diff(start)[between])
+        shared = {int(q): here[with_them[others == q]] for q in np.unique(others) if q != p}
+        found.append(Numbers(np.flatnonzero(part == p), nodes, int((owner[has] == p).sum()), shared))
     return found
+
+
+def mesh_of(space: Space, part: Numbers) -> skfem.Mesh:
+    """Elements and nodes of a part, of the mesh of the whole body."""
+    here = np.full(space.n_nodes, -1)
+    here[part.nodes] = np.arange(part.nodes.size)
+    return type(space.mesh)(np.ascontiguousarray(space.X[part.nodes].T),
+                            np.ascontiguousarray(here[space.mesh.t[:, part.elements]]))

@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ...fields.stress import pressure, von_mises
-from ...results.series import Series
+from ...fields.momentum import Momentum
+from ...fields.state import State
+from ...fields.stress import cauchy_stress, pressure, von_mises
+from ...methods.ranks.crew import Member
+from ...methods.ranks.integrator import InParts
+from ...results.frame import ELEMENT, NODE
+from ...results.series import Series, frame_mesh, write_piece
 from ...system.files import prepare_folder
 from .observer import Observer
 from .view import View
@@ -88,13 +94,13 @@ class Frames(Observer):
         self._add(self.series, view)
 
     def _add(self, series: Series, view: View) -> None:
-        momentum, space, state, stress = view.body.momentum, view.body.space, view.state, view.stress
-        series.add(
-            state.time,
-            {"displacement": state.u, "velocity": state.v, "gamma": state.gamma},
-            {"deleted": state.deleted.astype(np.int8), "W": space.element_mean(np.minimum(momentum.W, 1e3)),
-             "gamma_element": space.element_mean(momentum.gamma), "stress": stress, "pressure": pressure(stress),
-             "von_mises": von_mises(stress), "crushed": np.isnan(stress).any(axis=1).astype(np.int8), **self._regions})
+        state, parts = view.state, view.integrator
+        if isinstance(parts, InParts) and parts.options.frame_pieces:
+            names = {region.name: number for number, region in enumerate(view.scene.regions, 1)}
+            series.add_pieces(state.time, parts.crew.size, lambda folder: parts.each(_write_piece, folder, names))
+            view.framed = True
+            return
+        series.add(state.time, *_fields(view.body.momentum, state, view.stress, self._regions))
 
     def finish(self, view: View) -> None:
         """Wait until all frames are written."""
@@ -113,3 +119,27 @@ class Frames(Observer):
         """A checkpoint names its frames: they are written before it."""
         self._flush()
         return super().memory()
+
+
+def _fields(momentum: Momentum, state: State, stress: np.ndarray,
+            regions: Mapping[str, np.ndarray]) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+    """What a frame has on points, and on cells."""
+    space = momentum.space
+    return ({"displacement": state.u, "velocity": state.v, "gamma": state.gamma},
+            {"deleted": state.deleted.astype(np.int8), "W": space.element_mean(np.minimum(momentum.W, 1e3)),
+             "gamma_element": space.element_mean(momentum.gamma), "stress": stress, "pressure": pressure(stress),
+             "von_mises": von_mises(stress), "crushed": np.isnan(stress).any(axis=1).astype(np.int8), **regions})
+
+
+def _write_piece(member: Member, folder: Path, names: Mapping[str, int]) -> list[str]:
+    """Write what a rank has of a frame; `names` are the regions of the scene with their numbers."""
+    assert member.part is not None
+    numbers, momentum, space = member.part.numbers, member.body.momentum, member.body.space
+    regions = {}
+    if names:
+        regions["region"] = np.zeros(space.n_elements, np.int32)
+        for region in momentum.regions:
+            regions["region"][region.elements] = names[region.name]
+    points, cells = _fields(momentum, member.state, cauchy_stress(momentum, member.state.u), regions)
+    return write_piece(folder, member.comm.rank, frame_mesh(
+        space, {**points, NODE: numbers.nodes}, {**cells, ELEMENT: numbers.elements}))

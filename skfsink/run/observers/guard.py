@@ -98,7 +98,7 @@ class Guard(Observer):
             self.check_step(view.state)
         if not step or view.moment or super().due(view):
             self.check_record(view.state)
-        if view.stress_is_known:  # a frame has asked for it
+        if view.stress_is_known or view.framed:  # at a frame
             self.check_overlap(view.state)
             self._check_stress(view)
 
@@ -107,8 +107,8 @@ class Guard(Observer):
         self.check_end()
 
     def _check_stress(self, view: View) -> None:
-        if view.stress_is_known:
-            self.check_stress(view.state, np.isnan(view.stress).any(axis=1))
+        if view.stress_is_known or view.framed:
+            self.check_stress(view.state, view.crushed)
 
     @property
     def _step_cure(self) -> str:

@@ -14,6 +14,7 @@ from ...fields.crack import CrackTracker, Tips
 from ...fields.state import State
 from ...fields.stress import cauchy_stress
 from ...methods.integrators import Integrator
+from ...methods.ranks.integrator import InParts
 from ...scene.scene import Scene
 from .gauge import Gauge
 
@@ -44,6 +45,7 @@ class View:
     moment: what has come with this step: "arrival", "branching", or "".
     on_time: whether the event begins at a load time that was given, before anything fails.
     waiting: whether a body from rest in motion has not cracked yet, which may take thousands of records.
+    framed: whether a frame was written at this moment by the ranks themselves, without the stress of the whole body.
     save: writes a checkpoint.   stop_asked: whether the run was asked to stop.
     """
 
@@ -63,6 +65,7 @@ class View:
     moment: str = ""
     on_time: bool = False
     waiting: bool = False
+    framed: bool = False
     save: Callable[[], None] = lambda: None
     stop_asked: Callable[[], bool] = lambda: False
 
@@ -109,13 +112,24 @@ class View:
     def stress(self) -> np.ndarray:
         """Mean Cauchy stress of the elements [MPa], (ne, 6); see :func:`.cauchy_stress`."""
         if self._stress is None:
-            self._stress = cauchy_stress(self.body.momentum, self.state.u)
+            parts = self.integrator
+            self._stress = parts.stress() if isinstance(parts, InParts) else cauchy_stress(self.body.momentum,
+                                                                                           self.state.u)
         return self._stress
 
     @property
     def stress_is_known(self) -> bool:
         """Whether an observer before has asked for the stress of this state."""
         return self._stress is not None
+
+    @property
+    def crushed(self) -> np.ndarray:
+        """Mask of the elements that no stress is defined for, (ne,)."""
+        parts = self.integrator
+        if self._stress is None and isinstance(parts, InParts):
+            return parts.crushed()
+        mask: np.ndarray = np.isnan(self.stress).any(axis=1)
+        return mask
 
     @property
     def step_share(self) -> float:
@@ -128,7 +142,7 @@ class View:
         self.before = state.time if occasion == "begin" else self.now
         self.now = state.time
         self.state, self._reaction, self.occasion, self.dt, self.way = state, reaction, occasion, dt, way
-        self.moment, self._stress = "", None
+        self.moment, self._stress, self.framed = "", None, False
         return self
 
     def crossed_multiple_of(self, every: float) -> bool:
