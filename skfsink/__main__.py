@@ -12,8 +12,8 @@ from .system.version import __version__
 __all__ = ["main"]
 
 COMMANDS = {"run": "run:run", "list": "cases:list_cases", "show": "show:show", "resume": "resume:resume",
-            "sweep": "sweep:sweep", "report": "report:report", "render": "render:render",
-            "material": "material:material", "mesh": "mesh:mesh"}
+            "sweep": "sweep:sweep", "watch": "watch:watch", "report": "report:report",
+            "render": "render:render", "material": "material:material", "mesh": "mesh:mesh"}
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..fields.fragments import SPENT
 
-__all__ = ["SPENT", "Frame", "frame_file", "read_frame"]
+__all__ = ["SPENT", "Frame", "frame_file", "frame_of", "read_frame"]
 
 
 def frame_file(name: str, number: int) -> str:
@@ -44,7 +44,11 @@ class Frame:
 
 def read_frame(path: Path, time: float, label: str, dim: int) -> Frame:
     """A frame of the ParaView series as the fields to draw."""
-    data = meshio.read(path)
+    return frame_of(meshio.read(path), time, label, dim)
+
+
+def frame_of(data: meshio.Mesh, time: float, label: str, dim: int) -> Frame:
+    """A frame that was read as the fields to draw."""
     u, v = (np.asarray(data.point_data[name], float)[:, :dim] for name in ("displacement", "velocity"))
     return Frame(time, label, u, np.asarray(data.point_data["gamma"], float),
                  np.asarray(data.cell_data["deleted"][0], bool), v)
