@@ -163,9 +163,10 @@ class Watch:
 
 
 def _chosen(entries: Sequence[Entry]) -> list[Entry]:
-    """The runs of which all is shown: those that go on, then those that have changed last."""
-    first = sorted(entries, key=lambda entry: (entry.seen.state != "running", -entry.changed))[:MOST]
-    return [entry for entry in entries if entry in first]
+    """The runs of which all is shown, of those that have begun: those that go on, then those that have changed last."""
+    begun = [entry for entry in entries if entry.seen.state != "waiting"] or entries
+    first = sorted(begun, key=lambda entry: (entry.seen.state != "running", -entry.changed))[:MOST]
+    return [entry for entry in begun if entry in first]
 
 
 def _heading(entries: Sequence[Entry]) -> str:
