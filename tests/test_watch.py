@@ -501,15 +501,17 @@ def test_a_browser_follows_a_run(copy: Path, browser: Any, width: int) -> None:
     assert look(places(copy)[0]).state == "interrupted"
 
 
-def test_a_browser_says_when_nobody_answers(done: Path, browser: Any) -> None:
-    """Fails if an old page looks like a new one."""
-    with served(done) as ask:
+def test_a_browser_says_when_nobody_answers(copy: Path, browser: Any) -> None:
+    """Fails if an old page looks like a new one, or a new one is said to be old."""
+    with served(goes_on(copy)) as ask:
         page = browser.new_page()
         page.goto(ask.url, wait_until="domcontentloaded")
         assert page.evaluate("document.getElementById('lost').hidden")
-        page.evaluate("document.documentElement.dataset.goesOn = 'yes'")
-    until(page, "!document.getElementById('lost').hidden")
-    page.close()
+        page.context.set_offline(True)
+        until(page, "!document.getElementById('lost').hidden")
+        page.context.set_offline(False)
+        until(page, "document.getElementById('lost').hidden")
+        page.close()
 
 
 @pytest.mark.slow
