@@ -12,7 +12,7 @@ from .system.version import __version__
 __all__ = ["main"]
 
 COMMANDS = {"run": "run:run", "list": "cases:list_cases", "show": "show:show", "resume": "resume:resume",
-            "sweep": "sweep:sweep", "report": "report:report", "render": "render:render",
+            "sweep": "sweep:sweep", "watch": "watch:watch", "report": "report:report", "render": "render:render",
             "material": "material:material", "mesh": "mesh:mesh", "partition": "partition:partition"}
 
 

@@ -7,14 +7,13 @@ import json
 import re
 import shutil
 from collections import Counter
-from collections.abc import Iterator
-from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
 import meshio
 import numpy as np
 import pytest
+from pages import Page
 from plates import SMALL, drawing, invoke, plate
 
 import skfsink
@@ -34,7 +33,6 @@ from skfsink.system import shipped
 from skfsink.system.shipped import data_folder
 
 PACKAGE = Path(skfsink.__file__).parent
-BROWSERS = ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome", "chrome")
 
 
 @pytest.fixture(scope="module")
@@ -174,31 +172,6 @@ def test_nothing_is_pickled() -> None:
 
 
 # --- the page ---
-class Page(HTMLParser):
-    """What is on a page: tags with their attributes, ids, and links that leave it."""
-
-    VOID = frozenset({"meta", "link", "img", "br", "hr", "input"})
-
-    def __init__(self, text: str) -> None:
-        super().__init__()
-        self.tags: list[tuple[str, dict[str, str | None]]] = []
-        self.open: list[str] = []
-        self.feed(text)
-        self.close()
-        assert self.open == []
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.tags.append((tag, dict(attrs)))
-        if tag not in self.VOID:
-            self.open.append(tag)
-
-    def handle_endtag(self, tag: str) -> None:
-        assert self.open.pop() == tag
-
-    def all(self, tag: str) -> list[dict[str, str | None]]:
-        return [attributes for name, attributes in self.tags if name == tag]
-
-
 def checked(text: str) -> Page:
     """The page, once it is known to be well-formed, to stand alone, and to say what its pictures and tables are."""
     page = Page(text)
@@ -383,21 +356,6 @@ def test_the_command_says_where_the_page_is(copy: Path, tmp_path: Path, monkeypa
 
 
 # --- in a browser ---
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    """A headless browser without a network."""
-    api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    found = next(filter(None, map(shutil.which, BROWSERS)), None)
-    if found is None:
-        pytest.skip(f"no browser is installed: none of {', '.join(BROWSERS)}")
-    with api.sync_playwright() as play:
-        started = play.chromium.launch(executable_path=found, args=[
-            "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
-            "--disable-component-update", "--disable-sync"])
-        yield started
-        started.close()
-
-
 def seen(browser: Any, path: Path, width: int) -> dict[str, Any]:
     """What a browser makes of a page in a window of that width."""
     page = browser.new_page(viewport={"width": width, "height": 800}, offline=True)

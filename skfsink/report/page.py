@@ -8,19 +8,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from ..errors import OutputError, SkfsinkError
+from ..errors import OutputError
 from ..results.loader import Run, load
 from ..system.files import reported, write_atomic
 from ..system.version import __version__
 from . import charts
 from .citation import bibtex, citations
-from .scenes import command_line, differences, parameter_table, run_labels
+from .scenes import command_line, differences, kind, named, parameter_table, run_labels, wave_speeds
 from .tables import EMPTY, Row, Table, cost_table, energy_tables, key_table, version_table
 
-__all__ = ["report_page", "write_report"]
+__all__ = ["environment", "report_page", "write_report"]
 
 _KINDS = {".png": "image/png", ".gif": "image/gif", ".svg": "image/svg+xml"}
 #: Pictures of a run: file, title, what it shows.
@@ -95,21 +95,18 @@ def report_page(asked: Sequence[Run]) -> str:
         if run.analysis == "both" or not (run.event["step"].size or run.finished):
             raise OutputError(f"the run in {run.folder} has not come to its event yet: there is nothing to report")
     labels = run_labels(runs)
-    waves = [_waves(run) for run in runs]
+    waves = [wave_speeds(run) for run in runs]
     keys = key_table(runs, labels, waves)
     several = len(runs) > 1
     drawn = [(title, chart) for title, chart in (
         ("Speed of the tip", charts.speed_chart(runs, labels, waves)),
         ("Energies over the length of the crack", charts.energy_chart(runs, labels)),
         ("Loading", charts.loading_chart(runs, labels))) if chart is not None]
-    environment = Environment(loader=PackageLoader("skfsink.report", ""), autoescape=True, undefined=StrictUndefined,
-                              trim_blocks=True, lstrip_blocks=True)
-    environment.filters["symbols"] = _symbols
     comparisons = [_picture(run.folder / "comparison.png", "Dynamic beside quasi-static",
                             "The dynamic crack beside the quasi-static one, and the energies of both at the end")
                    for run in asked if run.parts]
     parts = [_part(run, label, several) for run, label in zip(runs, labels)]
-    return environment.get_template("page.html").render(
+    return environment("skfsink.report").get_template("page.html").render(
         title=_title(asked), several=several, labels=labels, keys=keys,
         cards=[] if several else [row for row in keys.rows if row.name in _CARDS],
         charts={title: Picture(_data(chart.svg, ".svg"), title, chart.alt) for title, chart in drawn},
@@ -120,23 +117,20 @@ def report_page(asked: Sequence[Run]) -> str:
         versions=version_table(runs, labels), citations=citations(), bibtex=bibtex(), version=__version__)
 
 
+def environment(*packages: str) -> Environment:
+    """Of the templates in the folders of some packages, the first of which goes first."""
+    made = Environment(loader=ChoiceLoader([PackageLoader(name, "") for name in packages]), autoescape=True,
+                       undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    made.filters["symbols"] = _symbols
+    return made
+
+
 def _title(asked: Sequence[Run]) -> str:
-    names = list(dict.fromkeys(_named(run) for run in asked))
+    names = list(dict.fromkeys(named(run) for run in asked))
     if len(asked) > 1:
         return f"{len(asked)} runs compared: {', '.join(names)}"
     run = asked[0]
-    return f"{names[0][0].upper()}{names[0][1:]}, mesh {Path(str(run.parameters.get('mesh', ''))).stem}, {_kind(run)}"
-
-
-def _named(run: Run) -> str:
-    """The case, or the title of a scene of your own."""
-    return str(run.parameters.get("title") or run.case.replace("_", " "))
-
-
-def _kind(run: Run) -> str:
-    if run.analysis == "both":
-        return "dynamic and quasi-static"
-    return "quasi-static" if run.analysis == "quasistatic" else f"dynamic ({run.parameters.get('integrator')})"
+    return f"{names[0][0].upper()}{names[0][1:]}, mesh {Path(str(run.parameters.get('mesh', ''))).stem}, {kind(run)}"
 
 
 def _part(run: Run, label: str, several: bool) -> Part:
@@ -144,7 +138,7 @@ def _part(run: Run, label: str, several: bool) -> Part:
     pictures = {title: _picture(run.folder / name, title, lead + alt) for name, title, alt in PICTURES}
     choice = run.summary.get("model") or run.model_choice
     rows = tuple(Row(name.replace("_", " "), "", (_flat(value),)) for name, value in choice.items() if name != "text")
-    return Part(label, f"{_named(run)}, mesh {run.parameters.get('mesh', EMPTY)}, {_kind(run)}",
+    return Part(label, f"{named(run)}, mesh {run.parameters.get('mesh', EMPTY)}, {kind(run)}",
                 _note(run), {title: picture for title, picture in pictures.items() if picture}, tuple(run.warnings),
                 run.assumed, rows, str(choice.get("text", "")), parameter_table(run), command_line(run), run.finished,
                 run.verdict)
@@ -156,20 +150,6 @@ def _flat(value: object) -> str:
     if isinstance(value, list):
         return ", ".join(map(str, value))
     return f"{value:.4g}" if isinstance(value, float) else str(value)
-
-
-def _waves(run: Run) -> tuple[float, float] | None:
-    """Shear and Rayleigh wave speed [m/s] of a dynamic run; None where there is nothing to compare with them."""
-    if run.analysis != "dynamic" or run.made_in_python:
-        return None
-    try:
-        parts = run.scene.parts
-    except SkfsinkError:  # a mesh file that is gone, for instance
-        return None
-    if len(parts) > 1:  # each has its own
-        return None
-    material = parts[0].material
-    return material.shear_wave_speed, material.rayleigh_wave_speed
 
 
 def _picture(path: Path, title: str, alt: str) -> Picture | None:

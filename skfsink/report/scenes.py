@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
+from ..errors import SkfsinkError
 from ..results.loader import Run
 from ..scene.case import CaseParameter, shared_parameters
 from ..scene.options import Options
@@ -13,7 +15,8 @@ from ..scene.registry import CASES, find_case
 from ..scene.stored import SCENE, TABLES
 from .tables import EMPTY, Row, Table
 
-__all__ = ["command_line", "differences", "meanings", "parameter_table", "run_labels"]
+__all__ = ["command_line", "differences", "kind", "meanings", "named", "parameter_table", "path_labels", "run_labels",
+           "wave_speeds"]
 
 _LABELS = {"dynamic": "dynamic", "quasistatic": "quasi-static"}
 
@@ -83,9 +86,42 @@ def run_labels(runs: Sequence[Run]) -> list[str]:
     if len(runs) == 2 and [run.folder.name for run in runs] == list(_LABELS) and \
             runs[0].folder.parent == runs[1].folder.parent:
         return list(_LABELS.values())
-    paths = [run.folder.absolute().parts for run in runs]
+    return path_labels([run.folder for run in runs])
+
+
+def path_labels(folders: Sequence[Path]) -> list[str]:
+    """The end of each path, as long as it must be to be the only one."""
+    if not folders:
+        return []
+    paths = [folder.absolute().parts for folder in folders]
     for depth in range(1, max(map(len, paths)) + 1):
         labels = ["/".join(parts[-depth:]) for parts in paths]
         if len(set(labels)) == len(labels):
             return labels
     return [f"{label} ({i + 1})" for i, label in enumerate(labels)]
+
+
+def named(run: Run) -> str:
+    """The case, or the title of a scene of one's own."""
+    return str(run.parameters.get("title") or run.case.replace("_", " "))
+
+
+def kind(run: Run) -> str:
+    """The analysis of a run, and the integrator of a dynamic one."""
+    if run.analysis == "both":
+        return "dynamic and quasi-static"
+    return "quasi-static" if run.analysis == "quasistatic" else f"dynamic ({run.parameters.get('integrator')})"
+
+
+def wave_speeds(run: Run) -> tuple[float, float] | None:
+    """Shear and Rayleigh wave speed [m/s] of a dynamic run; None where there is nothing to compare with them."""
+    if run.analysis != "dynamic" or run.made_in_python:
+        return None
+    try:
+        parts = run.scene.parts
+    except SkfsinkError:  # a mesh file that is gone, for instance
+        return None
+    if len(parts) > 1:  # each has its own
+        return None
+    material = parts[0].material
+    return material.shear_wave_speed, material.rayleigh_wave_speed

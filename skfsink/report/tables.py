@@ -12,7 +12,8 @@ import numpy as np
 from ..results.history import onset_load
 from ..results.loader import ENERGIES, Run
 
-__all__ = ["Row", "Table", "cost_table", "energy_tables", "key_table", "number", "version_table"]
+__all__ = ["EMPTY", "Row", "Table", "cost_table", "energy_tables", "key_table", "number", "row_of", "table_of",
+           "version_table"]
 
 EMPTY = "–"
 
@@ -56,8 +57,8 @@ def number(value: Any) -> str:
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
-def _row(name: str, unit: str | Sequence[str], values: Sequence[Any]) -> Row:
-    """A row; where the units of the runs differ they stand in the cells."""
+def row_of(name: str, unit: str | Sequence[str], values: Sequence[Any]) -> Row:
+    """A row with a value for each run; where the units of the runs differ they stand in the cells."""
     units = [unit] * len(values) if isinstance(unit, str) else list(unit)
     cells = [number(value) for value in values]
     if len(set(units)) == 1:
@@ -66,7 +67,8 @@ def _row(name: str, unit: str | Sequence[str], values: Sequence[Any]) -> Row:
                                for cell, cell_unit in zip(cells, units)))
 
 
-def _table(caption: str, labels: Sequence[str], rows: Sequence[Row]) -> Table:
+def table_of(caption: str, labels: Sequence[str], rows: Sequence[Row]) -> Table:
+    """A table of the rows that some run has."""
     return Table(caption, tuple(labels), tuple(row for row in rows if not row.empty))
 
 
@@ -107,7 +109,7 @@ def key_table(runs: Sequence[Run], labels: Sequence[str], waves: Sequence[tuple[
 
     def row(name: str, unit: str | Sequence[str], *keys: str, factor: float = 0.0) -> Row:
         get = _scaled(factor, *keys) if factor else lambda run: _get(run, *keys)
-        return _row(name, unit, [get(run) for run in runs])
+        return row_of(name, unit, [get(run) for run in runs])
 
     rows = [
         row("greatest load while it was loaded", force, "loading", "greatest_load"),
@@ -115,15 +117,15 @@ def key_table(runs: Sequence[Run], labels: Sequence[str], waves: Sequence[tuple[
         row("nominal strength", "MPa", "material_point", "nominal_strength_MPa"),
         row("nominal strength by theory, incompressible", "MPa", "material_point", "nominal_strength_theory_MPa"),
         row("displacement of the grips at the onset", "mm", "onset", "displacement_mm"),
-        _row("load at the onset", force, [onset_load(_get(run, "onset") or {}) for run in runs]),
+        row_of("load at the onset", force, [onset_load(_get(run, "onset") or {}) for run in runs]),
         row("elastic energy at the onset", energy, "onset", "elastic_energy"),
-        _row("where it begins to fail", "", [_beginning(run) for run in runs]),
+        row_of("where it begins to fail", "", [_beginning(run) for run in runs]),
         row("first arrival of the crack at an edge", "µs", "event", "first_arrival_s", factor=1e6),
         row("first arrival of the crack at an edge", "pass", "event", "first_arrival_pass"),
-        _row("mean tip speed until the first arrival", "m/s", mean),
-        _row("mean speed over c_R", "", [_share(w, v, 1) for w, v in zip(waves, mean)]),
-        _row("greatest speed of the tip", "m/s", fastest),
-        _row("greatest speed over c_R", "", [_share(w, v, 1) for w, v in zip(waves, fastest)]),
+        row_of("mean tip speed until the first arrival", "m/s", mean),
+        row_of("mean speed over c_R", "", [_share(w, v, 1) for w, v in zip(waves, mean)]),
+        row_of("greatest speed of the tip", "m/s", fastest),
+        row_of("greatest speed over c_R", "", [_share(w, v, 1) for w, v in zip(waves, fastest)]),
         row("branches", "", "event", "max_branches"),
         row("came apart", "", "event", "separated"),
         row("pieces at the end", "", "event", "pieces"),
@@ -137,7 +139,7 @@ def key_table(runs: Sequence[Run], labels: Sequence[str], waves: Sequence[tuple[
         rows += [row(f"of the whole sample: {name}", unit, "quantities", key) for name, unit, key in (
             ("load at the onset", force, "onset_load"), ("displacement at the onset", "mm", "onset_displacement"),
             ("U at the first arrival", energy, "U"), ("D at the first arrival", energy, "D"))]
-    return _table("Key figures", labels, rows)
+    return table_of("Key figures", labels, rows)
 
 
 def energy_tables(runs: Sequence[Run], labels: Sequence[str]) -> list[Table]:
@@ -147,35 +149,35 @@ def energy_tables(runs: Sequence[Run], labels: Sequence[str]) -> list[Table]:
 
     def rows(*keys: str) -> list[Row]:
         units = [run.history.units["elastic"] for run in runs for _ in keys]
-        return [_row(meaning, units, [getattr(run.energies.get(name), key, None) for run in runs for key in keys])
+        return [row_of(meaning, units, [getattr(run.energies.get(name), key, None) for run in runs for key in keys])
                 for name, _, meaning in ENERGIES]  # a run that did not fail has none
 
     if len(runs) == 1:
-        return [_table("Energies of the event", tuple(moments.values()), rows(*moments) if runs[0].energies else [])]
-    return [_table(f"Energies {moments[key]}", labels, rows(key)) for key in ("arrival", "end")]
+        return [table_of("Energies of the event", tuple(moments.values()), rows(*moments) if runs[0].energies else [])]
+    return [table_of(f"Energies {moments[key]}", labels, rows(key)) for key in ("arrival", "end")]
 
 
 def cost_table(runs: Sequence[Run], labels: Sequence[str]) -> Table:
     """What the runs have cost."""
     def row(name: str, unit: str, *keys: str) -> Row:
-        return _row(name, unit, [_get(run, *keys) for run in runs])
+        return row_of(name, unit, [_get(run, *keys) for run in runs])
 
     walls = [_get(run, "cost", "wall_s") or {} for run in runs]
     phases = list(dict.fromkeys(phase for wall in walls for phase in wall))
-    rows = [_row(f"wall time, {phase}", "s", [wall.get(phase) for wall in walls]) for phase in phases]
-    rows.append(_row("wall time, in all", "s", [sum(wall.values()) if wall else None for wall in walls]))
+    rows = [row_of(f"wall time, {phase}", "s", [wall.get(phase) for wall in walls]) for phase in phases]
+    rows.append(row_of("wall time, in all", "s", [sum(wall.values()) if wall else None for wall in walls]))
     rows += [row("steps or passes", "", "cost", "steps"),
              row("steps rejected", "", "cost", "rejected_steps"), row("solves for γ", "", "cost", "gamma_solves"),
              row("mass added to small elements, of that of the body", "", "event", "added_mass"),
              row("factorisations", "", "cost", "factorisations"), row("peak memory", "MB", "cost", "peak_rss_mb"),
              row("elements", "", "elements"), row("unknowns, displacement", "", "unknowns", "displacement"),
              row("unknowns, density", "", "unknowns", "density"),
-             _row("threads (0: as many as the machine lends)", "", [run.parameters.get("threads") for run in runs])]
-    return _table("Cost", labels, rows)
+             row_of("threads (0: as many as the machine lends)", "", [run.parameters.get("threads") for run in runs])]
+    return table_of("Cost", labels, rows)
 
 
 def version_table(runs: Sequence[Run], labels: Sequence[str]) -> Table:
     """Versions of the libraries, and the machine."""
     found = [_get(run, "versions") or {} for run in runs]
     names = list(dict.fromkeys(name for versions in found for name in versions))
-    return _table("Versions and machine", labels, [_row(name, "", [v.get(name) for v in found]) for name in names])
+    return table_of("Versions and machine", labels, [row_of(name, "", [v.get(name) for v in found]) for name in names])

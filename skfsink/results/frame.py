@@ -11,7 +11,7 @@ import numpy as np
 
 from ..fields.fragments import SPENT
 
-__all__ = ["NODE", "SPENT", "Frame", "frame_file", "pieces_of_frame", "read_fields", "read_frame"]
+__all__ = ["NODE", "SPENT", "Frame", "frame_file", "frame_of", "pieces_of_frame", "read_fields", "read_frame"]
 
 ELEMENT, NODE = "element", "node"  # arrays of pieces: numbers in the whole body
 
@@ -78,7 +78,11 @@ def _joined(values: list[np.ndarray], numbers: list[np.ndarray]) -> np.ndarray:
 
 def read_frame(path: Path, time: float, label: str, dim: int) -> Frame:
     """A frame of the ParaView series as the fields to draw."""
-    data = read_fields(path)
+    return frame_of(read_fields(path), time, label, dim)
+
+
+def frame_of(data: meshio.Mesh, time: float, label: str, dim: int) -> Frame:
+    """A frame that was read as the fields to draw."""
     u, v = (np.asarray(data.point_data[name], float)[:, :dim] for name in ("displacement", "velocity"))
     return Frame(time, label, u, np.asarray(data.point_data["gamma"], float),
                  np.asarray(data.cell_data["deleted"][0], bool), v)

@@ -22,6 +22,7 @@ from ..pictures.of_a_run import draw_comparison, draw_run
 from ..results.history import History
 from ..results.probes import PROBES
 from ..results.result import Result
+from ..results.status import STATUS
 from ..results.summary import write_summary
 from ..scene.case import Case
 from ..scene.deck import Deck
@@ -43,6 +44,7 @@ from .occupied import occupied
 from .request import RunRequest, read_request
 from .simulate import Loaded, Simulation, standard_observers
 from .summarize import summarize
+from .told import told
 from .two_pass import corridor_report, lay_corridor
 
 __all__ = ["run", "run_case"]
@@ -200,7 +202,7 @@ def _lock(locks: ExitStack, folders: Sequence[Path]) -> list[str]:
 def _begin(folder: Path, overwrite: bool) -> None:
     """Make the folder of a new run; what is left in it of an older one is no run that could be resumed."""
     prepare_folder(folder, overwrite)
-    for name in (SCENE, SUMMARY, Simulation.CHECKPOINT, Simulation.ONSET):
+    for name in (SCENE, SUMMARY, STATUS, Simulation.CHECKPOINT, Simulation.ONSET):
         (folder / name).unlink(missing_ok=True)
     for path in (folder / PROBES).glob("*.csv"):  # that are not written anew
         path.unlink()
@@ -277,9 +279,10 @@ def _run_one(scene: Scene, job: _Job, onset: Loaded | None = None) -> Result:
     if not job.resumes:
         simulation.checkpoint()  # from here on the run can be resumed, whenever it is killed
         _write_scene(scene, job.folder, job.made_in_python)
-    _announce(simulation, job)
-    state = simulation.run(onset)
-    return _finished(simulation, state, job)
+    with told(job.folder, job.display, lambda: simulation.notes.texts):
+        _announce(simulation, job)
+        state = simulation.run(onset)
+        return _finished(simulation, state, job)
 
 
 def _announce(simulation: Simulation, job: _Job) -> None:

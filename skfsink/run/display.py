@@ -6,6 +6,8 @@ import _thread
 import signal
 import threading
 import time
+from collections import deque
+from collections.abc import Callable
 from types import FrameType, TracebackType
 from typing import Any
 
@@ -20,10 +22,15 @@ __all__ = ["Display", "Interrupt"]
 class Display:
     """A progress line a phase with the figures below it; a line every ten seconds where there is no terminal.
 
-    Memory: the phase begun last, which `update` shows and `phase` ends.
+    Memory: the phase begun last, which `update` shows and `phase` ends, and the last lines: `status` gives both.
+
+    Attributes
+    ----------
+    changed: called after each change of what is shown.
     """
 
     LOG_EVERY = 10.0  # seconds
+    LINES = 40        # that are kept
 
     def __init__(self, quiet: bool = False) -> None:
         self.console = Console(stderr=True, quiet=quiet)
@@ -34,8 +41,10 @@ class Display:
         self._figures = Text(style="cyan")
         self._live = Live(Group(self._progress, self._figures), console=self.console, refresh_per_second=4)
         self._task: Any = None
-        self._phase = ""
+        self._phase, self._begun = "", time.time()
         self._logged = 0.0
+        self._lines: deque[str] = deque(maxlen=self.LINES)
+        self.changed: Callable[[], None] = lambda: None
 
     def __enter__(self) -> Display:
         if self.console.is_terminal and not self._quiet:
@@ -53,9 +62,11 @@ class Display:
             self._progress.update(self._task, completed=1.0)
             self._progress.stop_task(self._task)
         self._task = self._progress.add_task(name, total=1.0)
-        self._phase = name
+        self._phase, self._begun, self._figures.plain = name, time.time(), ""
         if not self.console.is_terminal:
             self.say(name)
+        else:
+            self._note(name)
 
     def update(self, fraction: float, figures: str) -> None:
         """Show that `fraction` of the phase is done, and `figures` below it; nothing before the first one."""
@@ -64,13 +75,31 @@ class Display:
         fraction = min(max(fraction, 0.0), 1.0)
         self._progress.update(self._task, completed=fraction)
         self._figures.plain = figures
-        if not self.console.is_terminal and time.monotonic() - self._logged > self.LOG_EVERY:
+        if time.monotonic() - self._logged > self.LOG_EVERY:
             self._logged = time.monotonic()
-            self.say(f"{self._phase} {fraction:.0%}  {figures}")
+            line = f"{self._phase} {fraction:.0%}  {figures}"
+            if self.console.is_terminal:
+                self._note(line)
+            else:
+                self.say(line)
+        self.changed()
 
     def say(self, text: str) -> None:
         """A line above the progress."""
         self.console.print(text, highlight=False, markup=False, soft_wrap=True)
+        self._note(text)
+
+    def _note(self, line: str) -> None:
+        self._lines.append(line)
+        self.changed()
+
+    def status(self) -> dict[str, Any]:
+        """What is shown now: the phase, when it began [s since 1970], how far it is, its time left [s] if that can be
+        told, the figures, and the last lines."""
+        task = next((task for task in self._progress.tasks if task.id == self._task), None)
+        return {"phase": self._phase, "phase_began": self._begun, "fraction": task.completed if task else 0.0,
+                "left_s": task.time_remaining if task else None, "figures": self._figures.plain,
+                "lines": list(self._lines)}
 
 
 class Interrupt:

@@ -7,15 +7,53 @@ import os
 import platform
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
 from ..errors import OutputError
 from ..system.files import HIDDEN, prepare_folder
 
-__all__ = ["occupied"]
+__all__ = ["Holder", "occupied"]
 
 LOCK, HOLDER = HIDDEN  # the file that is locked, and what is known of who has locked it
+
+
+@dataclass(frozen=True)
+class Holder:
+    """The process that is, or was when it was killed, in a folder.
+
+    Attributes
+    ----------
+    process: its number.   host: name of its machine.   since: when it came, in ISO 8601 with the zone.
+    """
+
+    process: int
+    host: str
+    since: str
+
+    @classmethod
+    def read(cls, folder: Path) -> Holder | None:
+        """That of a folder; None if there is none, or it is not known."""
+        try:
+            found = json.loads((folder / HOLDER).read_text(encoding="utf-8"))
+            return cls(int(found["process"]), str(found["host"]), str(found["since"]))
+        except (OSError, ValueError, KeyError, TypeError):
+            return None
+
+    @property
+    def alive(self) -> bool | None:
+        """Whether the process goes on; None if it is one of another machine. One of the same number that came later is
+        another."""
+        import psutil  # only those who look at runs of others need it
+
+        if self.host != platform.node():
+            return None
+        try:
+            came = psutil.Process(self.process).create_time()
+            return came < datetime.fromisoformat(self.since).timestamp() + 1.0
+        except (psutil.Error, ValueError, OverflowError):
+            return False
 
 
 @contextmanager
@@ -38,7 +76,7 @@ def occupied(folder: Path) -> Iterator[str]:
     try:
         lock.acquire(timeout=0)
     except Timeout:
-        raise OutputError(f"{folder} is in use by another run ({_holder(holder)}): wait for it, stop it, or take "
+        raise OutputError(f"{folder} is in use by another run ({_holder(folder)}): wait for it, stop it, or take "
                           f"another folder") from None
     except (OSError, NotImplementedError) as error:
         reason = getattr(error, "strerror", None) or error
@@ -61,9 +99,7 @@ def occupied(folder: Path) -> Iterator[str]:
         lock.release()
 
 
-def _holder(path: Path) -> str:
-    try:
-        found = json.loads(path.read_text())
-        return f"process {int(found['process'])} on {found['host']}, since {found['since']}"
-    except (OSError, ValueError, KeyError, TypeError):
-        return "its process is not known"
+def _holder(folder: Path) -> str:
+    found = Holder.read(folder)
+    return "its process is not known" if found is None else \
+        f"process {found.process} on {found.host}, since {found.since}"

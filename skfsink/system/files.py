@@ -38,8 +38,10 @@ def reported(failure: str) -> Iterator[None]:
 
 
 @contextmanager
-def replaced(path: str | Path) -> Iterator[Path]:
+def replaced(path: str | Path, lasting: bool = True) -> Iterator[Path]:
     """Give the path of a temporary file beside `path`, and put that in its place once the block has filled it.
+
+    One that is not `lasting` may be lost if the machine fails, and takes no time of the disk.
 
     Raises
     ------
@@ -50,17 +52,21 @@ def replaced(path: str | Path) -> Iterator[Path]:
     try:
         with reported(f"cannot write {path}"):
             yield part
-            with open(part, "r+b") as file:
-                os.fsync(file.fileno())
+            if lasting:
+                with open(part, "r+b") as file:
+                    os.fsync(file.fileno())
             os.replace(part, path)
     finally:
         with suppress(OSError):
             part.unlink(missing_ok=True)
 
 
-def write_atomic(path: str | Path, content: bytes | str) -> None:
-    """Write a file so that a reader finds the old content or the new, never a part. Text is UTF-8, lines end in LF."""
-    with replaced(path) as part:
+def write_atomic(path: str | Path, content: bytes | str, lasting: bool = True) -> None:
+    """Write a file so that a reader finds the old content or the new, never a part. Text is UTF-8, lines end in LF.
+
+    `lasting` is as in :func:`replaced`.
+    """
+    with replaced(path, lasting) as part:
         part.write_bytes(content.encode() if isinstance(content, str) else content)
 
 
