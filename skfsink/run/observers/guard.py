@@ -145,7 +145,7 @@ class Guard(Observer):
         if fails:
             self.evenness = self._even_share(loaded)
             check_onset(self.scene, begun)
-            self.notch = check_tip(self.space, int(np.argmax(loaded)))
+            self.notch = check_tip(self.space, int(np.argmax(loaded)), loaded)
         error, allowed = state.ledger.error(state.ledger.elastic), self.scene.controls.balance_tolerance
         if not error <= allowed:
             raise InstabilityError(f"the ledger of the loading is open by {error:.2%} of the stored energy, allowed "
