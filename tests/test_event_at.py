@@ -11,12 +11,20 @@ import pytest
 from guarded import Stop, simulation
 from plates import deck, figures, invoke_program
 from plates import plate as plate_mesh
+from test_curves import bar, speed_of
 from test_loads import PULL, scene, side
 
 from skfsink.errors import Interrupted, MeshError, ParameterError
+from skfsink.fields.body import Body
+from skfsink.fields.density import DensitySolver
+from skfsink.fields.state import State
 from skfsink.loads.curve import Curve
-from skfsink.loads.grips import Grip, Ramp, Velocity
+from skfsink.loads.grips import Grip, Ramp, Traction, Velocity
+from skfsink.loads.pressure import Pressure
+from skfsink.material import SinkLaw
 from skfsink.meshing.vtu import write_mesh
+from skfsink.methods.controls import ExplicitControls
+from skfsink.methods.explicit import Explicit
 from skfsink.results.history import History
 from skfsink.run.checks import refuse
 from skfsink.run.display import Display
@@ -88,6 +96,54 @@ def test_an_impact_is_a_wave(tmp_path: Path) -> None:
     assert speed[(way > 0.5 * reached) & (way < 0.8 * reached)].max() > 100.0
     assert speed[way > 1.6 * reached].max() < 10.0
     assert abs(state.ledger.balance) < 1e-9 * state.ledger.work
+
+
+PUSHES = {"ramp": Ramp((0.0, 1e-6, 1.0), (0.0, 0.1, 0.1)), "step": Ramp((0.0, 1e-9, 1.0), (0.0, 0.1, 0.1)),
+          "slow": 1.0, "weak": Ramp((0.0, 1e-9, 1.0), (0.0, 1e-6, 1e-6))}
+
+
+@pytest.mark.parametrize("push", PUSHES)
+def test_an_unloaded_body_is_set_in_motion_by_a_traction(push: str, tmp_path: Path) -> None:
+    """Fails if a body without any energy is given up, or a step of its first ones feeds some in: explicit and HHT agree.
+
+    Seen to fail without what the loads would store as the measure of a step (ramp, step), and without a scale of the
+    guard while there is no energy (ramp, step, slow).
+    """
+    found = []
+    for integrator in ("explicit", "hht"):
+        of = replace(scene((Traction("top", (0.0, PUSHES[push])),), (STILL,), event_time=3e-6, record_every=1e-6,
+                           integrator=integrator), event_at=0.0)
+        ledger = simulation(of, tmp_path / integrator).run().ledger
+        assert abs(ledger.initial) < 1e-17 and abs(ledger.balance) < 1e-9 * ledger.turnover
+        assert abs(ledger.numerical) < 5e-3 * ledger.turnover
+        found.append([ledger.elastic, ledger.kinetic, ledger.loads])
+    np.testing.assert_allclose(*found, rtol=0.03)
+
+
+def test_energy_of_a_wave_that_a_sudden_traction_sends() -> None:
+    """Fails if the first steps of an unloaded bar that is pulled at once are wrong: the wave takes T^2/(rho c) a time,
+    half of it stored and half in motion."""
+    pull = 1e-3
+    body = bar(None, 100, pull=Ramp((0.0, 1e-12, 1.0), (0.0, pull, pull)))
+    c, state = speed_of(body), State.intact(body.space)
+    whole = Body(body.momentum, DensitySolver(body.space, SinkLaw()), body.loading)
+    scheme = Explicit(whole, ExplicitControls(gamma_every=10**6, raised_mass=0.0))
+    scheme.begin(state)
+    for _ in scheme.run(state, 0.8 / c):
+        pass
+    exact = pull**2 / (body.momentum.material.rho0 * c) * state.time / 100
+    assert state.ledger.elastic == pytest.approx(exact / 2, rel=0.01)
+    assert abs(state.ledger.numerical) < 1e-3 * exact
+    assert state.ledger.kinetic == pytest.approx(exact / 2, rel=0.01) and scheme.rejected > 3
+
+
+def test_an_unloaded_body_is_set_in_motion_by_a_pressure(tmp_path: Path) -> None:
+    """Fails if pressures are not among the loads that a body without energy is measured by."""
+    of = replace(scene((), (STILL,), event_time=2e-6), event_at=0.0,
+                 pressures=(Pressure("top", Ramp((0.0, 1e-9, 1.0), (0.0, 0.02, 0.02))),))
+    ledger = simulation(of, tmp_path / "run").run().ledger
+    assert abs(ledger.initial) < 1e-17 and ledger.pressure_work > 1e-7 and abs(ledger.balance) < 1e-9 * ledger.turnover
+    assert abs(ledger.numerical) < 5e-3 * ledger.turnover
 
 
 @pytest.mark.parametrize("integrator", ["explicit", "hht"])

@@ -12,7 +12,7 @@ import meshio
 import numpy as np
 import pytest
 
-from skfsink.errors import MissingExtra, ParameterError
+from skfsink.errors import MeshError, MissingExtra, ParameterError
 from skfsink.meshing import outline as meshing
 from skfsink.meshing import shapes
 from skfsink.meshing.vtu import read_mesh, write_mesh
@@ -208,3 +208,18 @@ def test_seeds_choose_meshes(monkeypatch):
     assert len(other.cells_dict["quad"]) == pytest.approx(len(one.cells_dict["quad"]), rel=0.1)
     for mesh in (one, other):
         assert meshing.scaled_jacobian(mesh.points, mesh.cells_dict["quad"]).min() > 0
+
+
+@pytest.mark.parametrize(("start", "end", "said"), [
+    (0.45, 0.55, r"the edge 'mark' around \(0\.5, 1\) mm is 0\.1 mm long, and elements there are 0\.1 mm large, of which"
+                 r" an edge takes two .*: make elements there at most 0\.05 mm, or the edge longer"),
+    (0.5, 0.5, r"the edge 'mark' from \(0\.5, 1\) to \(0\.5, 1\) mm is no line .*: leave it out, or make it longer")])
+def test_a_short_edge_is_refused_in_one_line(start: float, end: float, said: str) -> None:
+    """Fails if what gmsh says of an edge of less than two elements, or of none, comes through as it is."""
+    pytest.importorskip("gmsh")
+    Edge = meshing.Edge
+    outline = [Edge("bottom", (1, 0)), Edge("right", (1, 1)), Edge("top", (end, 1)), Edge("mark", (start, 1)),
+               Edge("top", (0, 1)), Edge("left", (0, 0))]
+    with pytest.raises(MeshError, match=f"^{said}$") as caught:
+        meshing.mesh_outline(outline, meshing.SizeField(0.1, 0.1, ()))
+    assert "\n" not in str(caught.value)

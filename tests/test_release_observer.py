@@ -20,6 +20,7 @@ from skfsink.fields.crack import CrackTracker
 from skfsink.fields.release_rate import energy_release_rate
 from skfsink.loads.grips import Grip
 from skfsink.material import AAA
+from skfsink.results.history import History, history_header, history_units
 from skfsink.results.release import load_release, release_header, write_release
 from skfsink.run.display import Display
 from skfsink.run.observers.notch_tip import notch_tip
@@ -47,8 +48,12 @@ def test_rates_of_a_run_are_in_its_folder(tmp_path: Path) -> None:
     """Fails if rows, numbers or units are missing, the notch is not found, or a run differs for being looked at."""
     simulation(event(), tmp_path / "plain").run()
     simulation(event(), tmp_path / "seen", EnergyRelease(1e-6, radius=3.0)).run()
-    for name in ("history.csv", "deletions.csv"):
-        assert (tmp_path / "plain" / name).read_bytes() == (tmp_path / "seen" / name).read_bytes()
+    assert (tmp_path / "plain/deletions.csv").read_bytes() == (tmp_path / "seen/deletions.csv").read_bytes()
+    plain, seen = ([line.split(",") for line in (tmp_path / name / "history.csv").read_text().splitlines()]
+                   for name in ("plain", "seen"))
+    own = [i for i, name in enumerate(seen[0]) if name not in plain[0]]
+    assert [seen[0][i] for i in own] == ["G_N_per_mm", "G_tip_speed_m_per_s"]
+    assert [[cell for i, cell in enumerate(row) if i not in own] for row in seen] == plain
     columns = load_release(tmp_path / "seen" / "release.csv")
     assert list(columns) == release_header(2, "s") and (tmp_path / "seen" / "release.png").stat().st_size > 10000
     assert columns["phase"].tolist() == ["onset"] + ["event"] * (len(columns["phase"]) - 1) and len(columns["tip"]) > 8
@@ -64,6 +69,33 @@ def test_rates_of_a_run_are_in_its_folder(tmp_path: Path) -> None:
     assert columns["G_mean_N_per_mm"][one[-1]] == pytest.approx(np.nanmean(
         G[one][columns["time_s"][one] >= columns["time_s"][one[-1]] - 4 * 0.1 / 29.35e3]))
     assert 10 < np.nanmedian(columns["speed_m_per_s"]) < 60
+
+
+def test_history_has_the_greatest_rate_and_its_speed(tmp_path: Path) -> None:
+    """Fails if a row of the history has not the greatest G of the tips at the look that it falls on, in units of both
+    dimensions, or keeps one where no tip advances any more.
+
+    Seen to fail with the least G, with that of the look before, and with a rate that stays when tips have stopped.
+    """
+    simulation(event(event_time=4e-5), tmp_path, EnergyRelease(1e-6, radius=3.0)).run()
+    table, rates = History.load(tmp_path / "history.csv"), load_release(tmp_path / "release.csv")
+    rows = np.flatnonzero(table["phase"] == "event")
+    known = 0
+    for row in rows:
+        there = (rates["phase"] == "event") & (rates["time_s"] == table["time_s"][row])
+        there &= np.isfinite(rates["G_N_per_mm"])
+        if not there.any():
+            assert np.isnan(table["G_N_per_mm"][row]) and np.isnan(table["G_tip_speed_m_per_s"][row])
+            continue
+        known += 1
+        first = np.flatnonzero(there)[np.argmax(rates["G_N_per_mm"][there])]
+        assert table["G_N_per_mm"][row] == rates["G_N_per_mm"][first]
+        np.testing.assert_equal(table["G_tip_speed_m_per_s"][row], rates["speed_m_per_s"][first])
+    assert known > 8 and np.isnan(table["G_N_per_mm"][table["phase"] == "loading"]).all()
+    assert np.isnan(table["G_N_per_mm"][rows]).any() and np.unique(rates["tip"]).size > 2
+    for dim in (2, 3):
+        assert {"G_N_per_mm", "G_tip_speed_m_per_s"} <= set(history_header(dim))
+        assert history_units(dim)["G_N_per_mm"] == "N/mm"
 
 
 def test_a_deck_asks_for_rates(tmp_path: Path) -> None:
@@ -82,7 +114,8 @@ def test_resumed_run_has_the_same_rates(tmp_path: Path) -> None:
         simulation(event(), stopped, EnergyRelease(2e-6), Stop(500)).run()
     assert not (stopped / "release.csv").exists()
     Simulation(event(), stopped, Display(True), resume=True, observers=[EnergyRelease(2e-6), Stop(10**9)]).run()
-    assert (whole / "release.csv").read_bytes() == (stopped / "release.csv").read_bytes()
+    for name in ("release.csv", "history.csv"):
+        assert (whole / name).read_bytes() == (stopped / name).read_bytes()
     assert len(load_release(whole / "release.csv")["tip"]) > 5
 
 

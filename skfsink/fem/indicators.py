@@ -8,7 +8,7 @@ import numpy as np
 
 from .space import Space, node_key
 
-__all__ = ["Corner", "alternation", "corner_near", "element_pressure", "greatest_stretch", "inverted", "mean_density",
+__all__ = ["Corner", "alternation", "below", "corner_near", "element_pressure", "greatest_stretch", "inverted", "mean_density",
            "size_near", "turning", "turnings"]
 
 
@@ -19,12 +19,14 @@ class Corner(NamedTuple):
     ----------
     angle: by which it turns [degrees].   place: [mm], (dim,).
     radius: of the circle that the facets beside it are chords of [mm].   thickness: of their elements [mm].
+    into: unit vector into the body, (dim,).
     """
 
     angle: float
     place: np.ndarray
     radius: float
     thickness: float
+    into: np.ndarray
 
 
 def turning(space: Space) -> tuple[float, np.ndarray]:
@@ -90,9 +92,20 @@ def corner_near(space: Space, element: int) -> Corner | None:
     beside = np.isin(members, nodes[worst]).sum(axis=1) == nodes.shape[1]
     far = [space.X[np.setdiff1d(facet, nodes[worst])].mean(axis=0) for facet in members[beside]]
     lengths = np.linalg.norm(np.array(far) - place, axis=1)
-    thickness = space.extent[space.mesh.f2t[0, facets[beside]]] / (lengths * breadth)
+    owners = space.mesh.f2t[0, facets[beside]]
+    thickness = space.extent[owners] / (lengths * breadth)
+    into = (space.X[space.conn[owners]].mean(axis=1) - space.X[members[beside]].mean(axis=1)).sum(axis=0)
     return Corner(float(angles[worst]), place, float(lengths.mean() / np.radians(angles[worst])),
-                  float(thickness.mean()))
+                  float(thickness.mean()), into / np.linalg.norm(into))
+
+
+def below(space: Space, corner: Corner, depth: float) -> np.ndarray:
+    """Elements (k,) straight below a corner, no deeper than `depth` [mm]: their middles are near that line."""
+    away = space.X[space.conn].mean(axis=1) - corner.place
+    along = away @ corner.into
+    aside = np.linalg.norm(away - along[:, None] * corner.into, axis=1)
+    facet = corner.radius * np.radians(corner.angle)
+    return np.flatnonzero((along > 0) & (along <= depth) & (aside <= np.maximum(0.75 * space.h, facet)))
 
 
 def size_near(space: Space, node: int, radius: float) -> float:

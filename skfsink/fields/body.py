@@ -186,6 +186,11 @@ class Body:
         """Energy [N mm; N mm/mm in 2D] below which rounding is seen: 1e-6 of what a crack takes as it runs by l."""
         return 1e-6 * self.density.law.phi * self.density.law.length_scale ** self.space.volume_dim
 
+    @property
+    def crack_energy(self) -> float:
+        """What a crack takes as it runs by l, Phi l^d [N mm; N mm/mm in 2D]: the scale of a body without any energy."""
+        return self.density.law.phi * self.density.law.length_scale ** self.space.volume_dim
+
     @cached_property
     def wave_speed_at_failure(self) -> float:
         """Greatest speed of :func:`.wave_speed_at_failure` among the materials [m/s]."""

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import MeshError, MissingExtra
+from ..errors import MeshError, MissingExtra, place_text
 from .edge import Edge
 from .ring import INNER, Ring
 
@@ -65,18 +65,24 @@ def gmsh_model() -> Iterator[Any]:
 def add_outline(gmsh: Any, outline: Sequence[Edge], rings: Sequence[Ring]) -> dict[int, str]:
     """Add the surface inside the outline to the model; returns the boundary names by curve tag.
 
-    Curves that rings of elements end at are divided as these are.
+    Curves that rings of elements end at are divided as these are. MeshError: a piece is no line or arc.
     """
     occ = gmsh.model.occ
     corners = [occ.addPoint(*edge.end, 0) for edge in outline]
     names: dict[int, str] = {}
     for i, edge in enumerate(outline):
-        if edge.via is None:
-            tag = occ.addLine(corners[i - 1], corners[i])
-        else:
-            via = occ.addPoint(*edge.via, 0)
-            tag = occ.addCircleArc(corners[i - 1], via, corners[i], center=False)
-            occ.remove([(0, via)])
+        try:
+            if edge.via is None:
+                tag = occ.addLine(corners[i - 1], corners[i])
+            else:
+                via = occ.addPoint(*edge.via, 0)
+                tag = occ.addCircleArc(corners[i - 1], via, corners[i], center=False)
+                occ.remove([(0, via)])
+        except Exception as error:  # gmsh raises nothing more special
+            start = np.array(outline[i - 1].end)
+            raise MeshError(f"the edge {edge.name!r} from {place_text(start)} to {place_text(np.array(edge.end))} mm "
+                            f"is no {'line' if edge.via is None else 'arc'} (gmsh: {_short(error)}): leave it out, or "
+                            f"make it longer") from None
         names[tag] = edge.name
     occ.addPlaneSurface([occ.addCurveLoop(list(names))])
     occ.synchronize()
@@ -106,6 +112,11 @@ def generate(gmsh: Any, size: Sizes, ripple: Sizes, scale: float,
     Returns
     -------
     points (n, 3), counter-clockwise quads (ne, 4), the lines of the boundaries, and the number of triangles left.
+
+    Raises
+    ------
+    MeshError
+        gmsh gives up, as where an edge is shorter than two elements.
     """
     mesh = gmsh.model.mesh
     mesh.clear()
@@ -116,7 +127,10 @@ def generate(gmsh: Any, size: Sizes, ripple: Sizes, scale: float,
             edges = gmsh.model.occ.getMass(1, tag) / size((x0 + x1) / 2, (y0 + y1) / 2)
             if edges < SHORT_ARC:  # an even number of them, at least four
                 mesh.setTransfiniteCurve(tag, 2 * max(2, math.ceil(edges / 2)) + 1)
-    mesh.generate(2)
+    try:
+        mesh.generate(2)
+    except Exception as error:  # gmsh raises nothing more special
+        raise MeshError(_why_none(gmsh, size, names, _short(error))) from None
     tags, coordinates, _ = mesh.getNodes()
     index = np.zeros(int(tags.max()) + 1, dtype=np.int64)
     index[tags] = np.arange(len(tags))
@@ -127,6 +141,27 @@ def generate(gmsh: Any, size: Sizes, ripple: Sizes, scale: float,
     blocks = [(names[tag], index[mesh.getElements(1, tag)[2][0]].reshape(-1, 2))
               for _, tag in gmsh.model.getEntities(1) if names[tag] != INNER]
     return points, quads, blocks, len(triangles) // 3
+
+
+def _why_none(gmsh: Any, size: Sizes, names: Mapping[int, str], said: str) -> str:
+    """Why gmsh has made no mesh: the piece that is shortest, counted in the elements there."""
+    found = []
+    for _, tag in gmsh.model.getEntities(1):
+        if names[tag] != INNER:
+            x0, y0, _, x1, y1, _ = gmsh.model.getBoundingBox(1, tag)
+            place = (x0 + x1) / 2, (y0 + y1) / 2
+            found.append((gmsh.model.occ.getMass(1, tag) / size(*place), names[tag], place))
+    shortest, name, place = min(found)
+    if shortest >= 2.0:
+        return f"gmsh made no mesh: {said}; try another seed, or other sizes of elements"
+    h = size(*place)
+    return (f"the edge {name!r} around {place_text(np.array(place))} mm is {shortest * h:.3g} mm long, and elements there "
+            f"are {h:.3g} mm large, of which an edge takes two (gmsh: {said}): make elements there at most "
+            f"{shortest * h / 2:.2g} mm, or the edge longer")
+
+
+def _short(error: Exception) -> str:
+    return str(error).strip().splitlines()[0].rstrip(".") if str(error).strip() else type(error).__name__
 
 
 def areas(cells: Array) -> Array:

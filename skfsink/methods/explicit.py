@@ -197,6 +197,8 @@ class Explicit:
             energy_fed_in += work
         if dead is not None or pressures is not None:
             initial = max(abs(initial), present)
+            if abs(energy_fed_in) > self.controls.energy_tolerance * energy:  # a body without energy that is loaded
+                energy = max(energy, self.length.borne(u, self._inverse))
         if not self.length.accepts(energy_fed_in, energy, initial):
             self.momentum.set_time(state.grip)
             return False

@@ -117,10 +117,13 @@ class HHT:
         state.a[...] = 0.0
         state.a.reshape(-1)[self.free] = self.solver.solve(self._now.inertia)
         state.ledger.elastic = self.momentum.energy
-        state.ledger.kinetic = self.inertia.kinetic(self._now.mass, state.v)
+        state.ledger.kinetic = self._kinetic(self._now, state.v)
         state.ledger.loads, state.ledger.contact = self.momentum.loads, self.momentum.pressed
         state.ledger.initial = (state.ledger.elastic + state.ledger.kinetic + state.ledger.loads
                                 + state.ledger.contact)
+
+    def _kinetic(self, balance: Balance, v: np.ndarray) -> float:
+        return self.inertia.kinetic(balance.mass, balance.places, v)
 
     def run(self, state: State, t_end: float) -> Iterator[State]:
         """Step until `t_end` [s], yielding the state after each accepted step."""
@@ -213,7 +216,11 @@ class HHT:
         self._bury(state, new)
         if trial.end == self._knot:
             self._grip_velocity, self._knot = self.loading.velocity(trial.end), self.loading.corner(trial.end)
+            before = self.inertia.guided(self._now.places, state.v)
             state.v[self._held] = self.loading.motion(trial.end)[self._held]
+            gained = self.inertia.guided(self._now.places, state.v) - before
+            state.ledger.kinetic += gained
+            state.ledger.work += gained
             if self.momentum.is_viscous:
                 force, viscous = self._forces(state)
                 self._now = self._now._replace(force=force, viscous=viscous)
@@ -231,7 +238,8 @@ class HHT:
         ledger.contact = self.momentum.pressed
         held = float((0.5 * (old.force + new.force) * du)[self._held].sum())
         ledger.numerical += held - stored - motion
-        ledger.work += held
+        mean = 0.5 * (old.places + new.places)
+        ledger.work += held + self.inertia.guided(mean, v) - self.inertia.guided(mean, state.v)
         book_viscous(ledger, old, new, du)
         given = self.momentum.pressure_work(state.u, trial.u, self._pressures)
         ledger.numerical += given
@@ -252,11 +260,11 @@ class HHT:
             self._book_loads(state)
             ledger.deletion += float(np.einsum("eq,eq,eq->", self.space.w, new.gamma - momentum.gamma, new.W))
         mass, places = self.inertia.matrix(), self.inertia.places()
-        moving = self.inertia.kinetic(new.mass, state.v)
+        moving = self._kinetic(new, state.v)
         dead = self.space.lump(momentum.gamma) <= 0.0
         state.v[dead] = 0.0
         state.a[dead] = 0.0
-        ledger.kinetic = self.inertia.kinetic(mass, state.v)
+        ledger.kinetic = self.inertia.kinetic(mass, places, state.v)
         ledger.deletion += moving - ledger.kinetic  # with what the mass floor of dead nodes still had
         momentum.book_contact(ledger, state.u)
         force, viscous = self._forces(state)

@@ -54,7 +54,12 @@ class Inertia:
         p = self._pattern
         return symmetric_product(p.indptr.view(np.uint32), p.indices.view(np.uint32), mass, x)
 
-    def kinetic(self, mass: np.ndarray, v: np.ndarray) -> float:
-        """Kinetic energy of the free unknowns at velocities v (n, dim)."""
+    def kinetic(self, mass: np.ndarray, places: np.ndarray, v: np.ndarray) -> float:
+        """Kinetic energy of the body at velocities v (n, dim), what is held included, of mass in both its forms."""
         free = v.ravel()[self.free]
-        return 0.5 * float(free @ self.times(mass, free))
+        return 0.5 * float(free @ self.times(mass, free)) + self.guided(places, v)
+
+    def guided(self, places: np.ndarray, v: np.ndarray) -> float:
+        """What the motion of held unknowns adds to the kinetic energy of the free ones; 0 where they stand still."""
+        free = np.where(self.free.reshape(v.shape), v, 0.0)
+        return float(np.vdot(places, self.half_v2(v) - self.half_v2(free)))

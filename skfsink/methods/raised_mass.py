@@ -8,12 +8,16 @@ b_a the mean gradient of the shape function of a node and n_a the number of node
 width h. The body's highest frequency is at most the greatest of these (Irons' theorem). Elements that together fill at
 most a share of the volume get as much more mass as it takes to swing like the fastest of the others. Forces stay what
 they are, and so do statics and the onset; the body is heavier there, and answers later.
+
+Of a body of revolution the widths in the half plane count: a small radius makes no small element, and b_a is the mean
+over the section, without the strain around the axis.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from ..fem.space import Space
 from ..fields.momentum import Momentum
 
 __all__ = ["raised_mass"]
@@ -32,7 +36,7 @@ def raised_mass(momentum: Momentum, share: float) -> tuple[np.ndarray | None, fl
     space, square = momentum.space, np.empty(momentum.space.n_elements)
     for material, elements, _ in momentum.parts:
         square[slice(None) if elements is None else elements] = material.dilatational_wave_speed**2
-    b, exchange = space.mean_slopes(), space.exchange
+    b, exchange = _slopes(space), space.exchange
     square *= b.shape[1] * np.einsum("eai,eai->e", b, b)
     squares, V = exchange.all(square), exchange.all(space.V)
     fastest = np.argsort(-squares, kind="stable")
@@ -42,3 +46,12 @@ def raised_mass(momentum: Momentum, share: float) -> tuple[np.ndarray | None, fl
     mass = momentum.rho0 * space.V[:, None]
     added = exchange.total(float((mass * (factors - 1)).sum())) / exchange.total(float(mass.sum()))
     return (factors, added) if added > 0.0 else (None, 0.0)
+
+
+def _slopes(space: Space) -> np.ndarray:
+    """Mean gradients of the shape functions (ne, na, dim) [1/mm], of a body of revolution over the section."""
+    if not space.axisymmetric:
+        return space.mean_slopes()
+    area = space.w * space.around.sum(axis=2)  # the sum of N_a/R is 1/R
+    slopes: np.ndarray = np.einsum("eq,eqai->eai", area, space.dN) / area.sum(axis=1)[:, None, None]
+    return slopes

@@ -119,6 +119,23 @@ class StepLength:
         added += 0.0 if followers is None else followers.stiffest(u, inverse)
         return float((omega**2 + added) ** 0.5)
 
+    def borne(self, u: np.ndarray, inverse: np.ndarray) -> float:
+        """What the body would store at rest under its dead loads and pressures f, at least: sum of f^2/(2 m omega^2).
+
+        `u` (n, dim) is the displacement last evaluated, `inverse` (n, dim) the inverse masses. With f of one node and
+        omega the highest frequency no shape of the body is stiffer than that.
+        """
+        dead, followers = self.momentum.dead, self.momentum.followers
+        if self._omega <= 0.0 or (dead is None and followers is None):
+            return 0.0
+        force = np.zeros_like(u)
+        if dead is not None:
+            force[dead.nodes] += dead.values
+        if followers is not None:
+            followers.add_force(u, force)
+        square = self.momentum.space.exchange.dot(np.ones(len(u)), np.einsum("ni,ni,ni->n", force, force, inverse))
+        return 0.5 * square / self._omega**2
+
     def accepts(self, error: float, energy: float, initial: float) -> bool:
         """Whether a step may be taken that feeds in the `error` of the `energy` of the body; it is halved if not.
 

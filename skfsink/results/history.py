@@ -14,7 +14,7 @@ from ..errors import OutputError
 from ..system.files import write_atomic
 from .rows import append_rows, csv_text, finished_lines
 
-__all__ = ["HISTORY_COLUMNS", "OF_PRESSURES", "Column", "History", "Table", "deletions_header", "history_header",
+__all__ = ["HISTORY_COLUMNS", "OF_PRESSURES", "OF_RELEASE", "Column", "History", "Table", "deletions_header", "history_header",
            "history_units", "load_name", "onset_load"]
 
 
@@ -27,12 +27,14 @@ class Column(NamedTuple):
     unit: for a plane body: "1" for plain numbers, "" for words. N/mm and N mm/mm are N and N mm for one in space.
     kind: of its values.
     before: its value in files without the column, as those of before there was one; None if there are no such files.
+    per_length: whether it is a force or an energy by a length of the body in space too, and keeps its unit.
     """
 
     meaning: str
     unit: str = "1"
     kind: type = float
     before: Any = None
+    per_length: bool = False
 
 
 _FORCE, _ENERGY, _VOLUME = "N/mm", "N mm/mm", "mm^2"  # of a plane body
@@ -67,6 +69,9 @@ HISTORY_COLUMNS: dict[str, Column] = {
     "tip_z_mm": Column("position of the leading tip, undeformed", "mm"),
     "crack_length_mm": Column("length of the crack, undeformed", "mm"),
     "tip_speed_m_per_s": Column("speed of the leading tip", "m/s"),
+    "G_N_per_mm": Column("greatest energy release rate of a tip at the last look; only in runs that follow it", _FORCE,
+                         before=math.nan, per_length=True),
+    "G_tip_speed_m_per_s": Column("speed of that tip", "m/s", before=math.nan),
     "tips": Column("tips that advance", kind=int),
     "branches": Column("branches, advancing or arrested", kind=int),
     "deleted_elements": Column("failed elements, and those of debris that was removed", kind=int),
@@ -75,6 +80,8 @@ HISTORY_COLUMNS: dict[str, Column] = {
 }
 #: Columns that only runs with pressures have.
 OF_PRESSURES = ("pressure_work", "pressure_MPa", "swept_volume")
+#: Columns that only runs with an :class:`.EnergyRelease` have.
+OF_RELEASE = ("G_N_per_mm", "G_tip_speed_m_per_s")
 _IN_SPACE = {_FORCE: "N", _ENERGY: "N mm", _VOLUME: "mm^3"}
 _SUFFIX = {"s": "_s", "mm": "_mm", "m/s": "_m_per_s", "N/mm": "_N_per_mm", "N": "_N", "N mm/mm": "_N_mm_per_mm",
            "N mm": "_N_mm", "MPa": "_MPa", "mm^2": "_mm2", "mm^3": "_mm3", "1": "", "": ""}
@@ -84,7 +91,8 @@ _MISSING: dict[type, Any] = {str: "", int: 0, float: math.nan}
 def history_units(dim: int) -> dict[str, str]:
     """Unit of each column for a body of 2 or 3 dimensions: "1" for plain numbers, "" for words."""
     in_space = _IN_SPACE if dim == 3 else {}
-    return {name: in_space.get(column.unit, column.unit) for name, column in HISTORY_COLUMNS.items()}
+    return {name: column.unit if column.per_length else in_space.get(column.unit, column.unit)
+            for name, column in HISTORY_COLUMNS.items()}
 
 
 def history_header(dim: int) -> list[str]:

@@ -145,7 +145,7 @@ class Guard(Observer):
         if fails:
             self.evenness = self._even_share(loaded)
             check_onset(self.scene, begun)
-            self.notch = check_tip(self.space, int(np.argmax(loaded)))
+            self.notch = check_tip(self.space, int(np.argmax(loaded)), loaded)
         error, allowed = state.ledger.error(state.ledger.elastic), self.scene.controls.balance_tolerance
         if not error <= allowed:
             raise InstabilityError(f"the ledger of the loading is open by {error:.2%} of the stored energy, allowed "
@@ -176,6 +176,14 @@ class Guard(Observer):
         return self.dissolved
 
     # --- during the event ---
+    def _scale(self, state: State) -> float:
+        """What errors of energy are relative to: that of the onset, or of a body that began without any, which loads
+        set in motion, the greatest of the energies or, while there is none yet, what a crack takes as it runs by l."""
+        body, loading = self._view.body, self._view.body.loading
+        if self.scale > body.least_energy or (loading.dead is None and loading.followers is None):
+            return state.ledger.scale(self.scale)
+        return max(state.ledger.scale(0.0), body.crack_energy)
+
     def check_step(self, state: State) -> None:
         """Look at what every step leaves behind; a few comparisons.
 
@@ -185,7 +193,7 @@ class Guard(Observer):
             Energy has been fed in, or is no number; too much failed at once; a live point is inside out.
         """
         ledger = state.ledger
-        energy_fed_in = -ledger.numerical / ledger.scale(self.scale)
+        energy_fed_in = -ledger.numerical / self._scale(state)
         allowed = self.scene.controls.balance_tolerance
         if not (energy_fed_in <= allowed and np.isfinite(ledger.elastic + ledger.kinetic)):
             raise InstabilityError(f"energy fed in by the integrator {energy_fed_in:.2%} of the onset energy at "
@@ -209,7 +217,7 @@ class Guard(Observer):
             The ledger is open, a field is not finite, the body is gone, or a live point is inside out.
         """
         ledger, space, l = state.ledger, self.space, self.scene.sink_law.length_scale
-        allowed, scale = self.scene.controls.balance_tolerance, ledger.scale(self.scale)
+        allowed, scale = self.scene.controls.balance_tolerance, self._scale(state)
         lost = (ledger.deletion - ledger.debris) / scale
         worst, name = max((ledger.error(scale), "energy balance error"),
                           (lost, "energy lost in deleted elements"), key=_nan_first)

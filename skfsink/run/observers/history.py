@@ -11,7 +11,7 @@ import numpy as np
 from ...errors import CheckpointError, ParameterError
 from ...fields.momentum import terms_without
 from ...loads.follower import FollowerLoads
-from ...results.history import HISTORY_COLUMNS, OF_PRESSURES, deletions_header
+from ...results.history import HISTORY_COLUMNS, OF_PRESSURES, OF_RELEASE, deletions_header
 from ...results.history import History as Rows
 from ...system.files import write_atomic
 from .observer import Observer
@@ -44,6 +44,15 @@ def _of_pressures(quantity: Callable[[FollowerLoads, np.ndarray], np.ndarray]) -
     return value
 
 
+def _released(place: int) -> Callable[[View], float]:
+    """Greatest G, or the speed of its tip; NaN in the loading and where no observer follows it."""
+    def value(view: View) -> float:
+        following = view.release if view.state.phase == "event" else None
+        return math.nan if following is None else following(view)[place]
+
+    return value
+
+
 #: what each column of :data:`.HISTORY_COLUMNS` says of a run
 VALUES: dict[str, Callable[[View], Any]] = {
     "phase": lambda view: view.state.phase,
@@ -60,6 +69,7 @@ VALUES: dict[str, Callable[[View], Any]] = {
     "tip_x_mm": _tip(0), "tip_y_mm": _tip(1), "tip_z_mm": _tip(2),
     "crack_length_mm": lambda view: view.tips.length,
     "tip_speed_m_per_s": lambda view: 0.0 if _timeless(view) else view.tips.speed,
+    "G_N_per_mm": _released(0), "G_tip_speed_m_per_s": _released(1),
     "tips": lambda view: view.tips.active,
     "branches": lambda view: view.tips.branches,
     "deleted_elements": lambda view: len(view.state.deletions),
@@ -112,6 +122,8 @@ class History(Observer):
         without = terms_without(view.body.momentum, not view.quasistatic)
         if view.body.loading.followers is None:
             without += OF_PRESSURES
+        if view.release is None:
+            without += OF_RELEASE
         self._table = Rows(view.folder / "history.csv", self._kept, view.body.space.volume_dim, without)
 
     def loading(self, view: View) -> None:

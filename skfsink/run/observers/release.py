@@ -31,9 +31,10 @@ class EnergyRelease(Observer):
     the notch at which the body begins to fail. On a plane of symmetry along the crack, G is that of the whole body. In
     3D the front runs through the sheet, from one of its `faces` to the other. A row without a G says in `note` why.
     G scatters, as elements fail one by one and gamma is solved for at intervals; its mean over the last 4 l/c_s is
-    beside it.
+    beside it. The history of the run has the greatest G of a look, and the speed of that tip.
 
-    Memory: the rows so far, and the last places of each tip, which tell its speed.
+    Memory: the rows so far, the last places of each tip, which tell its speed, and when it last looked; `greatest` is
+    of that look.
 
     Parameters
     ----------
@@ -51,7 +52,7 @@ class EnergyRelease(Observer):
         A parameter is out of its range, or, when a run begins, its body is viscous.
     """
 
-    kept = ("rows", "trails")
+    kept = ("rows", "trails", "looked")
 
     def __init__(self, every: float, radius: float = RADIUS, every_passes: int = 1) -> None:
         self.every = require("every", every, "s", low=0, low_open=True)
@@ -59,6 +60,7 @@ class EnergyRelease(Observer):
         self.every_passes = int(require("every_passes", every_passes, low=1, whole=True))
         self.rows: list[list[Any]] = []
         self.trails: dict[str, list[list[float]]] = {}  #: [time, x, y(, z)] of each tip, by its number
+        self.looked = -1.0  #: time or pass of the last look
 
     def open(self, view: View, memory: Mapping[str, Any] | None = None) -> None:
         """Refuse a viscous body; take up the rows so far."""
@@ -67,6 +69,7 @@ class EnergyRelease(Observer):
             raise ParameterError("EnergyRelease cannot look at a viscous body: what viscosity takes on the way to the "
                                  "tip makes G depend on the domain; leave the viscosity out")
         self._planes = [plane for _, plane in symmetry_planes(view.scene)]
+        view.release = view.release or self.greatest
 
     def onset(self, view: View) -> None:
         """G of the notch at which the body begins to fail."""
@@ -83,14 +86,30 @@ class EnergyRelease(Observer):
     def look(self, view: View) -> None:
         """G of the tips that advance, as they were last found."""
         tips, tracker, time = view.tips, view.tracker, view.state.time
-        if view.occasion == "end" and self.rows and self.rows[-1][:2] == ["event", time]:
+        if time == self.looked:
             return
+        self.looked = time
         for node in tips.nodes[tracker.advances(time, tips.nodes)]:
             place = view.body.space.X[node]
             back = tracker.backwards(int(node), BACK * tracker.l)
             number = self._number(time, place, JUMP * tracker.l)
             note = "" if back is not None else "the crack is too short to have a direction"
             self._add(view, "event", number, place, None if back is None else -back, self._speed(view, number), note)
+
+    def greatest(self, view: View) -> tuple[float, float]:
+        """The greatest G of a tip at the last look [N/mm], at this moment where it is due, and the speed of that tip
+        [m/s]; NaN without one."""
+        if view.occasion != "step" or self.due(view):
+            self.look(view)
+        header = release_header(view.body.space.dim, view.clock)
+        place, speed = header.index("G_N_per_mm"), header.index("speed_m_per_s")
+        found = []
+        for row in reversed(self.rows):
+            if row[:2] != ["event", self.looked]:
+                break
+            if not math.isnan(row[place]):
+                found.append((row[place], row[speed]))
+        return max(found, key=lambda one: one[0], default=(math.nan, math.nan))
 
     def _number(self, time: float, place: np.ndarray, jump: float) -> int:
         """The number of the tip that was nearest to a place; a new one if none was near."""

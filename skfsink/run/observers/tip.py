@@ -1,7 +1,8 @@
 """How well a mesh resolves the notch at which a body begins to fail, and how late that makes the onset.
 
 The sink sees the energy at Gauss points, the first of which lie below the surface, where there is less of it: the
-thicker the elements at the tip, the later the onset. How much was measured: `docs/notches.md`.
+thicker the elements at the tip, the later the onset. How much was measured at notches: `docs/notches.md`. A surface
+that turns inwards is none where energy does not fall off below it, as through the wall of a sac.
 """
 
 from __future__ import annotations
@@ -10,8 +11,10 @@ import logging
 import math
 from typing import Any
 
+import numpy as np
+
 from ...errors import place_text
-from ...fem.indicators import corner_near
+from ...fem.indicators import Corner, below, corner_near
 from ...fem.space import Space
 from ...meshing.edge import ALONG
 from .range import SHARP
@@ -22,6 +25,8 @@ log = logging.getLogger(__name__)
 
 SLOPE = 0.61  # delay of the onset, of the opening, over the thickness of the elements, of the radius of the tip
 LATE = 0.03   # of the opening, past which an onset is warned of
+LOCAL = 0.4   # of the greatest W/Phi, to which it falls below a notch within half of the radius, or REACH elements
+REACH = 3.0   # thicknesses
 
 
 def late(share: float) -> float:
@@ -34,19 +39,35 @@ def thickness_for(delay: float) -> float:
     return delay / SLOPE
 
 
-def check_tip(space: Space, element: int) -> dict[str, Any]:
+def is_local(space: Space, corner: Corner, loaded: np.ndarray) -> bool:
+    """Whether W/Phi, `loaded` (ne,), is concentrated at a corner, so that it falls off below it over its radius.
+
+    Through the wall of a sac, or of a thin tube, it does not: its inner surface is no notch.
+    """
+    depth = max(0.5 * corner.radius, REACH * corner.thickness)
+    return bool(loaded[below(space, corner, depth)].min(initial=np.inf) < LOCAL * loaded.max())
+
+
+def check_tip(space: Space, element: int, loaded: np.ndarray) -> dict[str, Any]:
     """Warn where the onset, in an element, is that of a mesh that does not resolve the notch there.
+
+    Parameters
+    ----------
+    space, element: the mesh, and where it begins to fail.
+    loaded: greatest W/Phi of each element, (ne,).
 
     Returns
     -------
     Of the notch `radius_mm`, `elements_per_radius`, `thickness_mm` of its elements, `late`, the share of the opening by
     which the onset is expected to be late, and `place_mm`; radius and late are None at a sharp corner. Empty where the
-    surface does not turn inwards.
+    surface does not turn inwards, or the load is not local there.
     """
     corner = corner_near(space, element)
     if corner is None:
         return {}
     radius, sharp = corner.radius, corner.angle > SHARP
+    if not sharp and not is_local(space, corner, loaded):
+        return {}
     delay = late(corner.thickness / radius)
     figures = {"radius_mm": None if sharp else radius, "elements_per_radius": math.degrees(1.0) / corner.angle,
                "thickness_mm": corner.thickness, "late": None if sharp else delay, "place_mm": corner.place.tolist()}

@@ -46,6 +46,8 @@ class View:
     on_time: whether the event begins at a load time that was given, before anything fails.
     waiting: whether a body from rest in motion has not cracked yet, which may take thousands of records.
     framed: whether a frame was written at this moment by the ranks themselves, without the stress of the whole body.
+    release: greatest energy release rate of a tip [N/mm] at the last look of the first :class:`.EnergyRelease`, which
+        sets it as a run begins, and speed of that tip [m/s], each NaN if it is not known; None without such an observer.
     save: writes a checkpoint.   stop_asked: whether the run was asked to stop.
     """
 
@@ -66,6 +68,7 @@ class View:
     on_time: bool = False
     waiting: bool = False
     framed: bool = False
+    release: Callable[[View], tuple[float, float]] | None = None
     save: Callable[[], None] = lambda: None
     stop_asked: Callable[[], bool] = lambda: False
 
