@@ -86,16 +86,18 @@ def turned(space: Space, side: Callable[[int, float], np.ndarray]) -> Loading:
                                                    (0.0, 1.0, 2.0) if space.dim == 3 else ()))])
 
 
-def loaded_body(dim: int, load: Callable[[Space, Callable[[int, float], np.ndarray]], Loading]) -> Body:
-    """A block under a load, so long that parts meet at its top; that on oblique planes is turned."""
+def loaded_body(dim: int, load: Callable[[Space, Callable[[int, float], np.ndarray]], Loading],
+                rings: bool = False) -> Body:
+    """A block (or rings) under a load, so long that parts meet at its top; that on oblique planes is turned."""
     axes = [np.linspace(0, 0.8, 17), np.linspace(0, 0.4, 9), np.linspace(0, 0.2, 5)][:dim]
     mesh = (skfem.MeshQuad if dim == 2 else skfem.MeshHex).init_tensor(*axes)
     X, points = mesh.p.T.copy(), mesh.p.copy()
     if load is oblique:
         points[:2] = np.array([[0.8, -0.6], [0.6, 0.8]]) @ points[:2]
-    space = Space(type(mesh)(points, mesh.t))
+    space = Space(type(mesh)(points, mesh.t), rings)
     loading = load(space, lambda axis, at: np.flatnonzero(np.abs(X[:, axis] - at) < 1e-9))
-    momentum = Momentum(space, AAA(viscosity=1e-8), dead=loading.dead, followers=loading.followers)
+    momentum = Momentum(space, AAA(viscosity=1e-8), "axisymmetric" if rings else "jbar", dead=loading.dead,
+                        followers=loading.followers)
     return Body(momentum, DensitySolver(space, LAW, solver="jacobi"), loading)
 
 
@@ -246,12 +248,14 @@ def check_all(body: Body) -> None:
 
 
 def main() -> None:
-    """Check a plane body, one in space, one of revolution, and both of the first under loads of all kinds."""
+    """Check a plane body, one in space and one of revolution, by themselves and under loads of all kinds."""
     for dim, rings in ((2, False), (3, False), (2, True)):
         check_all(whole_body(dim, rings))
     for dim in (2, 3):
         for load in (dead, pressed, filled, oblique, turned):
             check_all(loaded_body(dim, load))
+    for load in (dead, pressed, filled):
+        check_all(loaded_body(2, load, True))
     print(f"rank {COMM.rank} of {COMM.size}: as the whole body", flush=True)
 
 
