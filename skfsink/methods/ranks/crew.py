@@ -23,6 +23,7 @@ from ...system.peak import peak_rss_mb
 from ..explicit import Explicit
 from .mpi import MPIExchange, wait
 from .part import ELEMENTAL, NODAL, PartOfBody, state_of
+from .tangent import TangentOfPart
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -33,7 +34,7 @@ IDLE = 1e-3    # s without a task, after which a rank looks for one less often
 UNEXPECTED = 1  # exit status of a program that ends by a mistake of its own
 #: what the first rank asks of all: to take something that it gives, to do something, to give something back
 GIVEN, DONE, COLLECTED = ("take", "begin", "restore"), ("step", "sync", "share"), ("new_deletions", "memory", "peak")
-TASKS = (*GIVEN, *DONE, *COLLECTED, "gather", "end")
+TASKS = (*GIVEN, *DONE, *COLLECTED, "gather", "tangent", "end")
 #: fields that can be gathered
 FIELDS = (*NODAL, *ELEMENTAL, "reaction")
 
@@ -67,6 +68,7 @@ class Member:
     def __init__(self, comm: MPI.Intracomm) -> None:
         self.comm = comm
         self.part: PartOfBody | None = None
+        self.tangent = TangentOfPart(comm)
 
     def take(self, part: PartOfBody) -> None:
         """Take up a part of the body."""
@@ -156,6 +158,12 @@ class Crew:
         self._ask(task)
         return self.comm.gather(getattr(self.member, task)()) or []
 
+    def tangent(self, task: str, items: Sequence[tuple[Any, ...]]) -> list[Any]:
+        """What a method of :class:`.TangentOfPart` gives on every rank, with arguments for each."""
+        self._ask("tangent")
+        mine = self.comm.scatter([(task, *item) for item in items])
+        return self.comm.gather(self.member.tangent.do(*mine)) or []
+
     def take(self, parts: list[PartOfBody]) -> None:
         """Give every rank its part."""
         self.numbers = [part.numbers for part in parts]
@@ -238,6 +246,8 @@ class Crew:
             getattr(member, task)(*comm.scatter(None))
         elif task in COLLECTED:
             comm.gather(getattr(member, task)())
+        elif task == "tangent":
+            comm.gather(member.tangent.do(*comm.scatter(None)))
         elif task == "gather":
             comm.gather(member.field(FIELDS[detail]))
         else:

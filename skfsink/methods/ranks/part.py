@@ -55,10 +55,15 @@ class PartOfBody:
     deletion: float
     controls: ExplicitControls
 
+    def balance(self, comm: MPI.Intracomm) -> Momentum:
+        """The momentum balance of the part, which tells the others what it has to."""
+        space = Space(self.mesh, self.axisymmetric, MPIExchange(comm, self.numbers, self.n_nodes))
+        return Momentum(space, self.material, regions=self.regions, **self.momentum)
+
     def body(self, comm: MPI.Intracomm) -> Body:
         """The part as a body whose balances tell the others what they have to."""
-        space = Space(self.mesh, self.axisymmetric, MPIExchange(comm, self.numbers, self.n_nodes))
-        momentum = Momentum(space, self.material, regions=self.regions, **self.momentum)
+        momentum = self.balance(comm)
+        space = momentum.space
         density = DensitySolver(space, self.sink_law, regions=self.regions, solver="jacobi", **self.density)
         return Body(momentum, density, self.loading, self.deletion)
 
