@@ -50,19 +50,19 @@ class NewtonInParts(Newton):
 
     def lead(self, body: Body, crew: Crew) -> None:
         """Take the ranks for the body."""
-        self._body, self._crew = body, crew
+        self._body, self.crew = body, crew
 
     @cached_property
     def solver(self) -> Solver:
         """What solves for steps on all ranks."""
-        return _InParts(self._linear, self._body, self._crew)
+        return _InParts(self._linear, self._body, self.crew)
 
     @cached_property
     def pattern(self) -> Any:
         """Each part has its own."""
         raise AssertionError("a body in parts has no pattern as a whole")
 
-    def _tangent(self, u: np.ndarray, convex: bool = False) -> np.ndarray:
+    def tangent(self, u: np.ndarray, convex: bool = False) -> np.ndarray:
         assert isinstance(self.solver, _InParts)
         return self.solver.assemble(u, self.momentum.gamma, convex)
 
