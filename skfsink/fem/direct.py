@@ -6,6 +6,7 @@ No direct solve returns a solution whose true residual was not measured.
 from __future__ import annotations
 
 import ctypes
+import math
 import os
 from collections.abc import Callable
 from contextlib import AbstractContextManager
@@ -22,8 +23,10 @@ from .pattern import Pattern
 
 os.environ.setdefault("MKL_CBWR", "AUTO,STRICT")  # the same bits from one run to the next, whatever the alignment
 
-__all__ = ["Factorization", "add_symmetric_product", "conjugate", "one_thread_of_openblas", "symmetric_product",
-           "unsigned"]
+__all__ = ["Factorization", "add_symmetric_product", "conjugate", "one_thread_of_openblas", "symmetric",
+           "symmetric_product", "unsigned"]
+
+Vectors = Callable[[np.ndarray], np.ndarray]
 
 try:
     import pypardiso
@@ -137,7 +140,7 @@ class Factorization:
         `most` iterations, or where A curves down; returns the last iterate, which is a direction of descent of
         x.A x/2 - b.x in any case but zero iterations, their number, and whether the tolerance was met.
         """
-        return conjugate(unsigned(self.pattern.matrix(data)), self.apply, b, tolerance, most)
+        return conjugate(symmetric(self.pattern.matrix(data)), self.apply, b, tolerance, most)
 
     def release(self) -> None:
         """Free the memory of the factors."""
@@ -218,27 +221,40 @@ class _Pardiso:
         return int(error.value)
 
 
-def conjugate(A: Rows, precondition: Callable[[np.ndarray], np.ndarray], b: np.ndarray, tolerance: float,
-              most: int) -> tuple[np.ndarray, int, bool]:
-    """Conjugate gradients on the upper triangle A of a matrix; see :meth:`Factorization.conjugate`."""
+def conjugate(times: Vectors, precondition: Vectors, b: np.ndarray, tolerance: float, most: int,
+              total: Callable[[float], float] = float) -> tuple[np.ndarray, int, bool]:
+    """Conjugate gradients on a matrix by what it makes of vectors; see :meth:`Factorization.conjugate`.
+
+    `total` adds what the products of parts of vectors are, where these are shared.
+    """
     x, r = np.zeros_like(b), b.copy()
-    target = tolerance * float(np.linalg.norm(b))
+    target = tolerance * math.sqrt(total(float(b @ b)))
     p, rz_old = np.zeros_like(b), 1.0
     for iteration in range(most):
         z = precondition(r)
-        rz = float(r @ z)
+        rz = total(float(r @ z))
         p *= rz / rz_old
         p += z
         rz_old = rz
-        q = symmetric_product(A.indptr, A.indices, A.data, p)
-        pq = float(p @ q)
+        q = times(p)
+        pq = total(float(p @ q))
         if not pq > 0.0:
             return x, iteration, False
         x += rz / pq * p
         r -= rz / pq * q
-        if float(np.linalg.norm(r)) <= target:
+        if math.sqrt(total(float(r @ r))) <= target:
             return x, iteration + 1, True
     return x, most, False
+
+
+def symmetric(A: csr_array) -> Vectors:
+    """What the matrix with the upper triangle A makes of a vector."""
+    rows = unsigned(A)
+
+    def times(x: np.ndarray) -> np.ndarray:
+        y: np.ndarray = symmetric_product(*rows, x)
+        return y
+    return times
 
 
 @njit(cache=True)

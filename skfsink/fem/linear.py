@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
 from .direct import Factorization
-from .multigrid import Gamg, Multigrid
+from .multigrid import Multigrid
 from .pattern import Pattern
+from .petsc import PETSC, OnOneRank, Petsc
 from .space import Space
 
 __all__ = ["LINEAR", "Solver", "solver"]
 
-Solver = Factorization | Multigrid
+Solver = Factorization | Multigrid | Petsc
 
 
 def _direct(space: Space, free: np.ndarray, pattern: Pattern, threads: int) -> Solver:
@@ -22,7 +24,7 @@ def _direct(space: Space, free: np.ndarray, pattern: Pattern, threads: int) -> S
 
 #: "direct" takes PARDISO, or SuperLU where that is not installed
 LINEAR: dict[str, Callable[[Space, np.ndarray, Pattern, int], Solver]] = {
-    "direct": _direct, "multigrid": Multigrid, "petsc-gamg": Gamg}
+    "direct": _direct, "multigrid": Multigrid, **{name: partial(OnOneRank, name) for name in PETSC}}
 
 
 def solver(name: str, space: Space, free: np.ndarray, pattern: Pattern, threads: int) -> Solver:

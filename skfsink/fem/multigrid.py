@@ -1,40 +1,92 @@
 """Conjugate gradients with algebraic multigrid for tangents: what factors of a million unknowns are too large for.
 
-The hierarchy is smoothed aggregation by pyamg, or GAMG by PETSc where that is installed. Both are given the rigid
-motions of the body, which its energy hardly resists; the number of iterations then hardly grows with the size.
+The hierarchy is smoothed aggregation by pyamg, or GAMG by PETSc (:mod:`.petsc`). Both are given the rigid motions of
+the body, which its energy hardly resists; the number of iterations then hardly grows with the size.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import pyamg
 from scipy.sparse import bsr_array, csr_array, diags_array
 
-from ..errors import ConvergenceError, ParameterError
+from ..errors import ConvergenceError
 from .amg import same_random_vectors
-from .direct import conjugate, unsigned
+from .direct import conjugate, symmetric
 from .pattern import Pattern
 from .space import Space
 
-__all__ = ["Gamg", "Multigrid", "rigid_motions"]
+__all__ = ["NOT_POSITIVE", "Iterated", "Multigrid", "rigid_motions"]
+
+NOT_POSITIVE = "the tangent of the body has an entry on its diagonal that is not above 0: take linear = 'direct'"
 
 
-def rigid_motions(X: np.ndarray) -> np.ndarray:
-    """Translations and infinitesimal rotations of nodes X (n, dim), as columns (n*dim, 3 or 6)."""
+def rigid_motions(X: np.ndarray, centre: np.ndarray | None = None, size: float = 0.0) -> np.ndarray:
+    """Translations and infinitesimal rotations of nodes X (n, dim), as columns (n*dim, 3 or 6).
+
+    About a `centre` (dim,) and over a `size` that are those of a body of which X is a part; else of X.
+    """
     n, dim = X.shape
+    about, size = X.mean(axis=0) if centre is None else centre, size or float(np.ptp(X))
     motions = [np.tile(row, (n, 1)) for row in np.eye(dim)]
     for i in range(dim):
         for j in range(i):
             turn = np.zeros_like(X)
-            turn[:, i], turn[:, j] = X[:, j] - X[:, j].mean(), X[:, i].mean() - X[:, i]
-            motions.append(turn / np.ptp(X))
+            turn[:, i], turn[:, j] = X[:, j] - about[j], about[i] - X[:, i]
+            motions.append(turn / size)
     return np.column_stack([motion.ravel() for motion in motions])
 
 
-class Multigrid:
+class Iterated:
+    """What solves by iteration, or in more than one place: solutions for several right-hand sides.
+
+    Memory: the matrix last given, and what was made of it.
+    """
+
+    exact = False
+    MOST = (500, 500)   # iterations of a solve, in two and in three dimensions
+    WORTH = (40, 40)    # iterations with a hierarchy of another matrix, after which a new one pays
+    TOLERANCE = 1e-9    # relative residual of a solve that is not told another
+
+    def __init__(self, dim: int) -> None:
+        self._dim, self.count, self.definite = dim, 0, True
+        self._data: np.ndarray | None = None
+
+    def conjugate(self, data: np.ndarray, b: np.ndarray, tolerance: float, most: int) -> tuple[np.ndarray, int, bool]:
+        """As :meth:`.Factorization.conjugate`."""
+        raise NotImplementedError
+
+    def apply(self, b: np.ndarray) -> np.ndarray:
+        """Solution with the matrix last given, for the right-hand side b, or columns of b.
+
+        Raises
+        ------
+        ConvergenceError
+            It did not converge.
+        """
+        if not b.size:
+            return b
+        if b.ndim == 2:
+            return np.column_stack([self.apply(column) for column in b.T])
+        return self._solution(b) if b.any() else np.zeros_like(b)
+
+    def _solution(self, b: np.ndarray) -> np.ndarray:
+        assert self._data is not None
+        x, iterations, met = self.conjugate(self._data, b, self.TOLERANCE, self.MOST[self._dim - 2])
+        if not met:
+            raise ConvergenceError(f"no solution by multigrid in {iterations} iterations: take linear = 'direct'")
+        return x
+
+    def solve_sum(self, B: np.ndarray, b: np.ndarray) -> np.ndarray:
+        """Solution of (A + B B^T) x = b, B with few columns, by Woodbury's formula."""
+        x, Z = self.apply(b), self.apply(B)
+        result: np.ndarray = x - Z @ np.linalg.solve(np.eye(B.shape[1]) + B.T @ Z, B.T @ x)
+        return result
+
+
+class Multigrid(Iterated):
     """What :class:`.Factorization` is, by iteration: "factors" are a hierarchy, and a solve is conjugate gradients.
 
     Memory: the hierarchy of the matrix last given to `factorize`, which `apply`, `solve_sum` and `conjugate` use and
@@ -51,13 +103,9 @@ class Multigrid:
     count: hierarchies made.   definite: whether no direction was found in which the last matrix curves down.
     """
 
-    exact = False
-    MOST = (500, 500)   # iterations of a solve, in two and in three dimensions
-    WORTH = (40, 40)    # iterations with a hierarchy of another matrix, after which a new one pays
-    TOLERANCE = 1e-9    # relative residual of a solve that is not told another
-
     def __init__(self, space: Space, free: np.ndarray, pattern: Pattern, threads: int = 1) -> None:
-        self.pattern, self.threads, self.count, self.definite = pattern, threads, 0, True
+        super().__init__(space.dim)
+        self.pattern, self.threads = pattern, threads
         dim = space.dim
         used = np.repeat(free.reshape(-1, dim).any(axis=1), dim)  # nodes come with all of their components
         number = np.cumsum(used) - 1
@@ -67,7 +115,6 @@ class Multigrid:
         held[self._place] = False
         self._motions[held] = 0.0
         self._held = held
-        self._data: np.ndarray | None = None
         self._cycle: Callable[[np.ndarray], np.ndarray] | None = None
         self._scale = np.ones(self._size)
 
@@ -82,8 +129,7 @@ class Multigrid:
         whole = csr_array(whole + diags_array(self._held.astype(float)))
         diagonal = whole.diagonal()
         if not (diagonal > 0.0).all():
-            raise ConvergenceError("the tangent of the body has an entry on its diagonal that is not above 0: take "
-                                   "linear = 'direct'")
+            raise ConvergenceError(NOT_POSITIVE)
         self._scale = 1.0 / np.sqrt(diagonal)
         scaled = csr_array(diags_array(self._scale) @ whole @ diags_array(self._scale))
         self._cycle = self._hierarchy(scaled, self._motions / self._scale[:, None])
@@ -111,76 +157,10 @@ class Multigrid:
 
         It ends as :meth:`.Factorization.conjugate` does.
         """
-        x, iterations, met = conjugate(unsigned(self.pattern.matrix(data)), self._precondition, b, tolerance, most)
+        x, iterations, met = conjugate(symmetric(self.pattern.matrix(data)), self._precondition, b, tolerance, most)
         self.definite = self.definite and (met or iterations == most)
         return x, iterations, met
-
-    def apply(self, b: np.ndarray) -> np.ndarray:
-        """Solution with the matrix last given, for the right-hand side b, or columns of b.
-
-        Raises
-        ------
-        ConvergenceError
-            It did not converge.
-        """
-        if not b.size:
-            return b
-        if b.ndim == 2:
-            return np.column_stack([self.apply(column) for column in b.T])
-        assert self._data is not None
-        if not b.any():
-            return np.zeros_like(b)
-        x, iterations, met = self.conjugate(self._data, b, self.TOLERANCE, self.MOST[self._block - 2])
-        if not met:
-            raise ConvergenceError(f"no solution by multigrid in {iterations} iterations: take linear = 'direct'")
-        return x
-
-    def solve_sum(self, B: np.ndarray, b: np.ndarray) -> np.ndarray:
-        """Solution of (A + B B^T) x = b, B with few columns, by Woodbury's formula."""
-        x, Z = self.apply(b), self.apply(B)
-        result: np.ndarray = x - Z @ np.linalg.solve(np.eye(B.shape[1]) + B.T @ Z, B.T @ x)
-        return result
 
     def release(self) -> None:
         """Free the memory of the hierarchy."""
         self._cycle = self._data = None
-
-
-class Gamg(Multigrid):
-    """The same with the hierarchy GAMG of PETSc.
-
-    Memory: see :class:`.Multigrid`.
-
-    Raises
-    ------
-    ParameterError
-        petsc4py is not there.
-    """
-
-    def __init__(self, space: Space, free: np.ndarray, pattern: Pattern, threads: int = 1) -> None:
-        super().__init__(space, free, pattern, threads)
-        try:
-            from petsc4py import PETSc
-        except ImportError as error:
-            raise ParameterError(f"linear petsc-gamg needs petsc4py ({error}): install it, or take linear = 'multigrid'"
-                                 ) from None
-        self._petsc: Any = PETSc
-
-    def _hierarchy(self, A: csr_array, motions: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
-        petsc = self._petsc
-        one = petsc.COMM_SELF
-        matrix = petsc.Mat().createAIJ(A.shape, bsize=self._block, comm=one, csr=(
-            A.indptr.astype(petsc.IntType), A.indices.astype(petsc.IntType), A.data))
-        basis, _ = np.linalg.qr(motions)
-        matrix.setNearNullSpace(petsc.NullSpace().create(vectors=[
-            petsc.Vec().createWithArray(np.ascontiguousarray(column), comm=one) for column in basis.T], comm=one))
-        cycle = petsc.PC().create(one)
-        cycle.setOperators(matrix)
-        cycle.setType("gamg")
-        cycle.setUp()
-
-        def apply(r: np.ndarray) -> np.ndarray:
-            z = np.empty_like(r)
-            cycle.apply(petsc.Vec().createWithArray(r, comm=one), petsc.Vec().createWithArray(z, comm=one))
-            return z
-        return apply

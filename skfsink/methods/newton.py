@@ -10,6 +10,7 @@ stable, so that the last steps are Newton's.
 from __future__ import annotations
 
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -18,7 +19,9 @@ from scipy.sparse.linalg import LinearOperator, gmres
 from ..errors import ConvergenceError
 from ..fem.linear import Solver, solver
 from ..fem.pattern import Pattern
+from ..fields.body import Body
 from ..fields.momentum import Momentum
+from .controls import StaticsControls
 
 __all__ = ["Newton"]
 
@@ -47,7 +50,7 @@ class Newton:
     LIVE = 1e-3     # nodes with less than this of their mass are not asked for equilibrium
     KEEP = 0.2      # factors are used as they are while each step with them lowers the residual to this fraction
     FAR = 0.5       # far from equilibrium: a step leaves more than this of the residual, or had to be shortened
-    INEXACT = 0.02  # relative residual of a step by conjugate gradients
+    INEXACT = 0.02  # relative residual of a step by conjugate gradients, at most
     LEAST_J = 0.05  # of a Gauss point that still carries force; below, a trial is refused
     SHORTEST = 1e-6  # step length at which a direction is given up
     RIM = 60         # iterations of GMRES, for the rim of a pressurised surface
@@ -67,6 +70,12 @@ class Newton:
         self._kept: tuple[np.ndarray, np.ndarray] | None = None  # displacement and gamma the factors were made at
         self._slow = False  # whether the factors have become too old to be used as they are
         self._spent = 0     # iterations and assemblies since they were made
+
+    @classmethod
+    def of(cls, body: Body, controls: StaticsControls) -> Self:
+        """That of a body."""
+        return cls(body.momentum, body.free, controls.tolerance, controls.max_newton, body.threads,
+                   linear=controls.linear)
 
     def equilibrium(self, u: np.ndarray, tolerance: float | None = None,
                     most: int | None = None) -> tuple[np.ndarray, np.ndarray]:
@@ -101,7 +110,7 @@ class Newton:
                 if modified:
                     d = self._solve(r, momentum.added_stiffness(u, self.free))
                 else:
-                    d, fresh = self._direction(u, r)
+                    d, fresh = self._direction(u, r, self._inexact(error, tolerance))
                 step.reshape(-1)[self.free] = d
                 step = momentum.unheld(step)
                 length, force = self._search(u, step, float(r @ d), energy, lowest)
@@ -153,13 +162,27 @@ class Newton:
         self._kept = None
 
     # --- directions ---
+    def tangent(self, u: np.ndarray, convex: bool = False) -> np.ndarray:
+        """The tangent at `u`, as the solver takes it."""
+        return self.momentum.tangent(self.pattern, u, convex)
+
     def _live(self) -> np.ndarray:
         live: np.ndarray = self.space.lump(self.momentum.gamma) > self.LIVE * self._volume
         return np.repeat(live, self.space.dim)[self.free]
 
+    def _inexact(self, error: float, tolerance: float) -> float:
+        """Relative residual of a step; less with multigrid near equilibrium, which saves Newton steps, not iterations.
+
+        It is the `error` that is left, as of Newton's own steps (Eisenstat and Walker 1996), but not below what takes
+        the error to a tenth of the `tolerance`.
+        """
+        if self.solver.exact:
+            return self.INEXACT
+        return min(self.INEXACT, max(error, 0.1 * tolerance / error))
+
     def _direction(self, u: np.ndarray, r: np.ndarray, tolerance: float = INEXACT) -> tuple[np.ndarray, bool]:
         """A step that lowers the residual force `r` at `u`, and whether the factors behind it are those of `u`."""
-        data = self.momentum.tangent(self.pattern, u)
+        data = self.tangent(u)
         added, skew = self.momentum.added_stiffness(u, self.free), self.momentum.skew_stiffness(u, self.free)
         plane = self.space.dim - 2
         most, worth = self.solver.MOST[plane], self.solver.WORTH[plane]
@@ -186,7 +209,7 @@ class Newton:
         d, iterations, _ = self.solver.conjugate(data, -r, tolerance, most)
         self.iterations += iterations
         if not d.any() and r.any():
-            data = self.momentum.tangent(self.pattern, u, convex=True)
+            data = self.tangent(u, convex=True)
             self.solver.factorize(data)
             d, iterations, _ = self.solver.conjugate(data, -r, tolerance, most)
             self.iterations += iterations
@@ -224,14 +247,20 @@ class Newton:
         self._kept, self._slow, self._spent = (u.copy(), self.momentum.gamma.copy()), False, 0
         if self.solver.factorize(data, indefinite=False):
             return
-        data = self.momentum.tangent(self.pattern, u, convex=True)
+        data = self.tangent(u, convex=True)
+        if not self.solver.factorize(data, indefinite=False):  # not seen: the convex tangent is definite
+            self._stiffen(data)
+
+    def _stiffen(self, data: np.ndarray) -> None:
+        """Factors of a positive definite matrix with a diagonal above that of `data`."""
         diagonal = np.abs(data[self.pattern.diagonal])
-        shift = 1e-4
-        while not self.solver.factorize(data, indefinite=False):  # not seen: the convex tangent is definite
+        shift, definite = 1e-4, False
+        while not definite:
             data[self.pattern.diagonal] += shift * diagonal
             shift *= 4
             if not shift < 1e8:
                 raise ConvergenceError("no equilibrium: the tangent is not finite")
+            definite = self.solver.factorize(data, indefinite=False)
 
     def _search(self, u: np.ndarray, step: np.ndarray, slope: float, energy: float,
                 lowest: float) -> tuple[float, np.ndarray]:
@@ -265,6 +294,6 @@ class Newton:
             return
         momentum, gamma = self.momentum, self.momentum.gamma
         momentum.gamma = memory["kept_gamma"]
-        self._factorise(memory["kept_u"], momentum.tangent(self.pattern, memory["kept_u"]))
+        self._factorise(memory["kept_u"], self.tangent(memory["kept_u"]))
         momentum.gamma = gamma
         self._slow, self._spent = bool(memory["slow"]), int(memory["spent"])

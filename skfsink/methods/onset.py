@@ -51,6 +51,7 @@ class StaticLoading:
     ----------
     body: the balances, and what loads it.
     controls: options.
+    newton: what finds equilibria; None for :class:`.Newton` on this rank.
     """
 
     SOUND = 0.999   # least gamma of a body that is as good as intact
@@ -65,13 +66,12 @@ class StaticLoading:
     until = np.inf  #: load time at which loading ends without an onset [s]
     LEAST = 1e-6  # part of the first increment at which a body without load is given up
 
-    def __init__(self, body: Body, controls: StaticsControls | None = None) -> None:
+    def __init__(self, body: Body, controls: StaticsControls | None = None, newton: Newton | None = None) -> None:
         self.body, self.momentum, self.density, self.loading = body, body.momentum, body.density, body.loading
         self.controls = controls or StaticsControls()
         self.space, self.free = body.space, body.free
         self.clock = LoadTime(self.loading, body.size, self.momentum.material.shear_modulus, self.controls.increment)
-        self.newton = Newton(self.momentum, self.free, self.controls.tolerance, self.controls.max_newton, body.threads,
-                             linear=self.controls.linear)
+        self.newton = newton or Newton.of(body, self.controls)
         self.increment = 0.0      #: current load increment, as load time [s]; 0 before the first
         self.refused = ""         #: why the last increment was given up: "no equilibrium", "runs away", "passes",
         #: "softens" (the increment is too long to follow the load over its peak), "open" (too long for the ledger) or

@@ -181,7 +181,8 @@ def _check(scene: Scene, job: _Job) -> None:
     if both:
         _copied(job.observers)
     check_memory(scene, job.display)
-    refuse_on_ranks(scene, scene.controls.analysis, scene.controls.integrator, job.ranks.partition)
+    c = scene.controls
+    refuse_on_ranks(scene, c.analysis, c.integrator, c.statics.linear, job.ranks.partition)
     if not job.resumes:
         refuse(scene)
 
@@ -291,7 +292,8 @@ def _announce(simulation: Simulation, job: _Job) -> None:
     space = scene.sample.space
     for text in scene.sample.notes:
         job.display.say(f"note: {text}")
-    if ranks := ranks_text(scene.controls.analysis, scene.controls.integrator):
+    if ranks := ranks_text(scene.controls.analysis, scene.controls.integrator,
+                            scene.controls.statics.linear):
         job.display.say(ranks)
     job.display.say(f"{scene.title}, mesh {scene.sample.name}: {space.n_elements} elements, "
                     f"{int(simulation.free.sum())} + {space.n_nodes} unknowns; {scene.controls.analysis} analysis in "

@@ -17,6 +17,7 @@ from ..fields.body import Body
 from ..fields.state import State
 from ..methods.integrators import Integrator
 from ..methods.ranks.integrator import InParts, RankOptions, integrator_of
+from ..methods.ranks.statics import statics_of
 from ..methods.rest import LoadingFromRest
 from ..methods.statics import Statics
 from ..scene.scene import Scene
@@ -89,7 +90,7 @@ class Simulation:
         self.scene, self.folder, self.display, self._ranks = scene, folder, display, ranks
         self.body = Body.of(scene)
         self.momentum, self.density, self.free = self.body.momentum, self.body.density, self.body.free
-        self.statics = Statics(self.body, scene.controls.statics)
+        self.statics = statics_of(self.body, scene.controls.statics)
         self.statics.until = scene.event_at
         self.notes = Notes(display.say, memory.get("warnings", ()))
         self.state = stored.state if stored else self.body.begin(State.intact(self.body.space))

@@ -11,7 +11,7 @@ import os
 import signal
 import sys
 import traceback
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any, NoReturn, TypeVar, cast
 
@@ -25,6 +25,7 @@ from ..explicit import Explicit
 from .mpi import MPIExchange, wait
 from .part import ELEMENTAL, NODAL, PartOfBody, state_of
 from .partition import Numbers
+from .tangent import TangentOfPart
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -36,7 +37,7 @@ IDLE = 1e-3    # s without a task, after which a rank looks for one less often
 UNEXPECTED = 1  # exit status of a program that ends by a mistake of its own
 #: what the first rank asks of all: to take something that it gives, to do something, to give something back
 GIVEN, DONE, COLLECTED = ("take", "begin", "restore"), ("step", "sync", "share"), ("new_deletions", "memory", "peak")
-TASKS = (*GIVEN, *DONE, *COLLECTED, "gather", "each", "end")
+TASKS = (*GIVEN, *DONE, *COLLECTED, "gather", "each", "tangent", "end")
 #: of the elements, at the last force: W, gamma at Gauss points, Cauchy stress, and whether none is defined
 EVALUATED = ("W", "points", "stress", "crushed")
 #: fields that can be gathered
@@ -72,6 +73,7 @@ class Member:
     def __init__(self, comm: MPI.Intracomm) -> None:
         self.comm = comm
         self.part: PartOfBody | None = None
+        self.tangent = TangentOfPart(comm)
 
     def take(self, part: PartOfBody) -> None:
         """Take up a part of the body; ParameterError on all ranks if one of them cannot read its."""
@@ -192,6 +194,12 @@ class Crew:
         self._ask(task)
         return self.comm.gather(getattr(self.member, task)()) or []
 
+    def tangent(self, task: str, items: Sequence[tuple[Any, ...]]) -> list[Any]:
+        """What a method of :class:`.TangentOfPart` gives on every rank, with arguments for each."""
+        self._ask("tangent")
+        mine = self.comm.scatter([(task, *item) for item in items])
+        return self.comm.gather(self.member.tangent.do(*mine)) or []
+
     def take(self, parts: Iterable[PartOfBody]) -> None:
         """Give every rank its part."""
         self.numbers: list[Numbers] = []
@@ -296,6 +304,8 @@ class Crew:
             comm.gather(getattr(member, task)())
         elif task == "each":
             member.each(comm.bcast(None))
+        elif task == "tangent":
+            comm.gather(member.tangent.do(*comm.scatter(None)))
         elif task == "gather":
             if (values := member.field(FIELDS[detail])) is not None:
                 wait(comm.Isend(np.ascontiguousarray(values), 0))

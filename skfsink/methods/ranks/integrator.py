@@ -9,6 +9,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from ...errors import ParameterError
+from ...fem.petsc import PETSC, check
 from ...fields.body import Body, BodyScene
 from ...fields.state import State
 from ..controls import EventControls
@@ -18,6 +19,7 @@ from .gathered import Gathered
 from .part import check_parts, parts_of
 from .parted import Parted
 from .partition import check_ranks
+from .statics import check_statics
 from .world import world
 
 __all__ = ["InParts", "RankOptions", "integrator_of", "ranks_text", "refuse"]
@@ -48,28 +50,45 @@ def integrator_of(name: str, body: Body, controls: EventControls, options: RankO
     return InParts(body, controls, Crew(comm), options)
 
 
-def ranks_text(analysis: str, integrator: str) -> str:
+def ranks_text(analysis: str, integrator: str, linear: str) -> str:
     """What the ranks that there are do; empty for one."""
     comm = world()
     if comm is None:
         return ""
+    loaded = "all of them load the body" if linear in PETSC else "one loads the body"
     if (analysis, integrator) == ("dynamic", "explicit"):
-        return f"{comm.size} ranks: one loads the body, all of them compute its event"
-    return f"{comm.size} ranks: one computes all of it, the others wait; parts know the explicit event alone"
+        return f"{comm.size} ranks: {loaded}, all of them compute its event"
+    if linear in PETSC:
+        event = "its equilibria" if analysis == "quasistatic" else "equilibria, and one computes its dynamic event"
+        return f"{comm.size} ranks: {loaded} and compute {event}"
+    return (f"{comm.size} ranks: one computes all of it, the others wait; parts know the explicit event alone, and "
+            f"statics with linear {' or '.join(PETSC)}")
 
 
-def refuse(scene: BodyScene, analysis: str, integrator: str, parted: Path | None = None) -> None:
-    """Refuse an event that the ranks that there are cannot compute, before the body is loaded (ParameterError).
+def refuse(scene: BodyScene, analysis: str, integrator: str, linear: str, parted: Path | None = None) -> None:
+    """Refuse what the ranks that there are cannot compute, and solvers that are not there, before the body is loaded.
 
     The same of parts in a folder that are not those of this mesh for these ranks.
+
+    Raises
+    ------
+    ParameterError
+        Which it is.
     """
+    check(linear)
     comm = world()
     if parted is not None:
         if analysis == "quasistatic" or integrator != "explicit":
             raise ParameterError("a partition is for an explicit event, and this run has none: leave partition out")
         Parted(parted).check(scene.space, 1 if comm is None else comm.size)
-    if comm is not None and analysis != "quasistatic" and integrator == "explicit":
+    if comm is None:
+        return
+    parts = linear in PETSC
+    if parts:
+        check_statics(scene.loading(), scene.controls, linear)
+    if parts or (analysis != "quasistatic" and integrator == "explicit"):
         check_ranks(comm.size, scene.space.n_elements)
+    if analysis != "quasistatic" and integrator == "explicit":
         check_parts(scene.space, scene.loading(), scene.controls)
 
 

@@ -66,12 +66,17 @@ class PartOfBody:
         own, mesh = self.parted.part(number)
         return replace(self, numbers=own, mesh=mesh)
 
-    def body(self, comm: MPI.Intracomm) -> Body:
-        """The part as a body whose balances tell the others what they have to."""
+    def balance(self, comm: MPI.Intracomm) -> Momentum:
+        """The momentum balance of the part, which tells the others what it has to."""
         space = Space(self.mesh, self.axisymmetric, MPIExchange(comm, self.numbers, self.n_nodes))
         self.loading.on(space)
-        momentum = Momentum(space, self.material, regions=self.regions, dead=self.loading.dead,
-                            followers=self.loading.followers, **self.momentum)
+        return Momentum(space, self.material, regions=self.regions, dead=self.loading.dead,
+                        followers=self.loading.followers, **self.momentum)
+
+    def body(self, comm: MPI.Intracomm) -> Body:
+        """The part as a body whose balances tell the others what they have to."""
+        momentum = self.balance(comm)
+        space = momentum.space
         density = DensitySolver(space, self.sink_law, regions=self.regions, solver="jacobi", **self.density)
         return Body(momentum, density, self.loading, self.deletion)
 
