@@ -211,8 +211,8 @@ def test_seeds_choose_meshes(monkeypatch):
 
 
 @pytest.mark.parametrize(("start", "end", "said"), [
-    (0.45, 0.55, r"the edge 'mark' around \(0\.5, 1\) mm is 0\.1 mm long, and elements there are 0\.1 mm large, of which"
-                 r" an edge takes two .*: make elements there at most 0\.05 mm, or the edge longer"),
+    (0.45, 0.55, r"the edge 'mark' around \(0\.5, 1\) mm is 0\.1 mm long, and elements there are 0\.1 mm large, of"
+                 r" which an edge takes two .*: make elements there at most 0\.05 mm, or the edge longer"),
     (0.5, 0.5, r"the edge 'mark' from \(0\.5, 1\) to \(0\.5, 1\) mm is no line .*: leave it out, or make it longer")])
 def test_a_short_edge_is_refused_in_one_line(start: float, end: float, said: str) -> None:
     """Fails if what gmsh says of an edge of less than two elements, or of none, comes through as it is."""

@@ -8,8 +8,8 @@ import numpy as np
 
 from .space import Space, node_key
 
-__all__ = ["Corner", "alternation", "below", "corner_near", "element_pressure", "greatest_stretch", "inverted", "mean_density",
-           "size_near", "turning", "turnings"]
+__all__ = ["Corner", "alternation", "below", "corner_near", "element_pressure", "greatest_stretch", "inverted",
+           "mean_density", "size_near", "turning", "turnings"]
 
 
 class Corner(NamedTuple):

@@ -155,8 +155,8 @@ def _why_none(gmsh: Any, size: Sizes, names: Mapping[int, str], said: str) -> st
     if shortest >= 2.0:
         return f"gmsh made no mesh: {said}; try another seed, or other sizes of elements"
     h = size(*place)
-    return (f"the edge {name!r} around {place_text(np.array(place))} mm is {shortest * h:.3g} mm long, and elements there "
-            f"are {h:.3g} mm large, of which an edge takes two (gmsh: {said}): make elements there at most "
+    return (f"the edge {name!r} around {place_text(np.array(place))} mm is {shortest * h:.3g} mm long, and elements "
+            f"there are {h:.3g} mm large, of which an edge takes two (gmsh: {said}): make elements there at most "
             f"{shortest * h / 2:.2g} mm, or the edge longer")
 
 

@@ -14,8 +14,8 @@ from ..errors import OutputError
 from ..system.files import write_atomic
 from .rows import append_rows, csv_text, finished_lines
 
-__all__ = ["HISTORY_COLUMNS", "OF_PRESSURES", "OF_RELEASE", "Column", "History", "Table", "deletions_header", "history_header",
-           "history_units", "load_name", "onset_load"]
+__all__ = ["HISTORY_COLUMNS", "OF_PRESSURES", "OF_RELEASE", "Column", "History", "Table", "deletions_header",
+           "history_header", "history_units", "load_name", "onset_load"]
 
 
 class Column(NamedTuple):

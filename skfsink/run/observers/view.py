@@ -44,8 +44,8 @@ class View:
     moment: what has come with this step: "arrival", "branching", or "".
     on_time: whether the event begins at a load time that was given, before anything fails.
     waiting: whether a body from rest in motion has not cracked yet, which may take thousands of records.
-    release: greatest energy release rate of a tip [N/mm] at the last look of the first :class:`.EnergyRelease`, which
-        sets it as a run begins, and speed of that tip [m/s], each NaN if it is not known; None without such an observer.
+    release: greatest energy release rate of a tip [N/mm] at the last look of the first :class:`.EnergyRelease`,
+        which sets it as a run begins, and speed of that tip [m/s], each NaN if it is not known; None without such an observer.
     save: writes a checkpoint.   stop_asked: whether the run was asked to stop.
     """
 
