@@ -45,7 +45,7 @@ class View:
     on_time: whether the event begins at a load time that was given, before anything fails.
     waiting: whether a body from rest in motion has not cracked yet, which may take thousands of records.
     release: greatest energy release rate of a tip [N/mm] at the last look of the first :class:`.EnergyRelease`,
-        which sets it as a run begins, and speed of that tip [m/s], each NaN if it is not known; None without such an observer.
+        which sets it as a run begins, and speed of that tip [m/s], each NaN if it is not known; None without one.
     save: writes a checkpoint.   stop_asked: whether the run was asked to stop.
     """
 
