@@ -107,8 +107,7 @@ def test_an_unloaded_body_is_set_in_motion_by_a_traction(push: str, tmp_path: Pa
     """Fails if a body without any energy is given up, or a step of its first ones feeds some in: explicit and HHT
     agree.
 
-    Seen to fail without what the loads would store as the measure of a step (ramp, step), and without a scale of the
-    guard while there is no energy (ramp, step, slow).
+    Seen to fail as it was before: ramp, step and slow are given up by the guard.
     """
     found = []
     for integrator in ("explicit", "hht"):

@@ -521,10 +521,7 @@ def test_an_event_begins_at_the_pressure_of_its_onset() -> None:
 
 def test_probe_of_a_filled_cavity_follows_its_volume_past_failure() -> None:
     """Fails if the volume of a filling is another one than that of the probe of its boundary, before elements at it
-    have failed or after, when the volume below them stays as it was; without a filling there is none then.
-
-    Seen to fail with the volume that the deformed boundary encloses, and with the sign turned.
-    """
+    have failed or after, when the volume below them stays as it was; without a filling there is none then."""
     space = tube(4)
     inner = at_radius(space, INNER)
     held = Held(space, symmetric(space), [(inner, Filling("inner", 0.1, 1e-5))])
