@@ -104,10 +104,10 @@ PUSHES = {"ramp": Ramp((0.0, 1e-6, 1.0), (0.0, 0.1, 0.1)), "step": Ramp((0.0, 1e
 
 @pytest.mark.parametrize("push", PUSHES)
 def test_an_unloaded_body_is_set_in_motion_by_a_traction(push: str, tmp_path: Path) -> None:
-    """Fails if a body without any energy is given up, or one of its first steps feeds some in: explicit and HHT agree.
+    """Fails if a body without any energy is given up, or a step of its first ones feeds some in: explicit and HHT
+    agree.
 
-    Seen to fail without what the loads would store as the measure of a step (ramp, step), and without a scale of the
-    guard while there is no energy (ramp, step, slow).
+    Seen to fail as it was before: ramp, step and slow are given up by the guard.
     """
     found = []
     for integrator in ("explicit", "hht"):

@@ -196,7 +196,7 @@ def test_mass_that_goes_takes_its_half_v_squared(kind: str, scheme: str):
 
 @pytest.mark.parametrize("scheme", CARRIED)
 def test_a_grip_that_starts_off_works_on_what_it_holds(kind: str, scheme: str):
-    """Fails if the kinetic energy of the held nodes, as their grip changes its pace at a corner, is not its work."""
+    """Fails if what held nodes gain in kinetic energy, as their grip changes its velocity at once, is not its work."""
     space = box(kind, 3 if kind == "quad" else 2, 0.2)
     momentum, density = Momentum(space, AAA(bulk_modulus=5.0)), DensitySolver(space, SinkLaw(phi=1e3))
     course, half = (Ramp((0.0, 1e-7, 1.1e-6), (0.0, 0.0, way)) for way in (2e-3, 1e-3))

@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import meshio
@@ -39,6 +40,7 @@ from skfsink.methods.hht import HHT
 from skfsink.methods.newton import Newton
 from skfsink.results.loader import load
 from skfsink.run.display import Display
+from skfsink.run.observers.probe_surfaces import VolumeProbe
 from skfsink.run.simulate import Simulation
 from skfsink.scene.deck import read_deck
 from skfsink.scene.options import Options
@@ -515,3 +517,29 @@ def test_an_event_begins_at_the_pressure_of_its_onset() -> None:
     again.at(state.grip)
     again.restore(held.followers.memory())
     assert again.pressures(state.u)[0] == held.followers.pressures(state.u)[0]
+
+
+def test_probe_of_a_filled_cavity_follows_its_volume_past_failure() -> None:
+    """Fails if the volume of a filling is another one than that of the probe of its boundary, before elements at it
+    have failed or after, when the volume below them stays as it was; without a filling there is none then."""
+    space = tube(4)
+    inner = at_radius(space, INNER)
+    held = Held(space, symmetric(space), [(inner, Filling("inner", 0.1, 1e-5))])
+    probes = [VolumeProbe("lumen", "inner", (0.0, 0.0)) for _ in range(2)]
+    for probe, pressures in zip(probes, (held.followers.loads, ())):
+        probe._prepared(SimpleNamespace(space=space, sample=SimpleNamespace(nodes=lambda _: inner),
+                                        pressures=pressures))  # type: ignore[arg-type]
+    held.load(0.5)
+    state, view = held.state, SimpleNamespace(state=held.state, body=held.body)
+    filled, plain = (float(probe._values(view)[0]) for probe in probes)  # type: ignore[arg-type]
+    p = held.followers.pressures(state.u)[0]
+    assert filled == pytest.approx(plain, rel=1e-12) and p > 0.0
+    whole = probes[0]._before
+    assert filled == pytest.approx(-whole + 0.1 * state.grip - 1e-5 * p, rel=1e-9)
+    failed = np.flatnonzero(np.isin(space.conn, inner).any(axis=1))[:2]
+    state.deleted[failed] = True
+    held.followers.keep(state.gamma, state.deleted, 1e-3)
+    state.u[np.unique(space.conn[failed])] += 0.5 * INNER * np.random.default_rng(0).random((1, space.dim))
+    after, none = (float(probe._values(view)[0]) for probe in probes)  # type: ignore[arg-type]
+    assert np.isnan(none) and after != filled
+    assert after == pytest.approx(-whole + held.followers.swept(state.u)[0], rel=1e-12)

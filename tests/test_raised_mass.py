@@ -69,10 +69,7 @@ def test_equal_elements_keep_their_mass(share: float) -> None:
 
 
 def test_elements_at_an_axis_of_revolution_are_no_small_ones() -> None:
-    """Fails if a small radius makes a small element, or one that is thin in the half plane is not seen.
-
-    Seen to fail with the slopes of volume ratios, which have the strain around the axis, and are means over volumes.
-    """
+    """Fails if a small radius makes a small element, or one that is thin in the half plane is not seen."""
     space = Space(grid("quad", (20, 20))).revolved()
     assert raised_mass(Momentum(space, AAA(), "axisymmetric"), 0.05) == (None, 0.0)
     flat, round_ = graded(), graded().revolved()

@@ -49,6 +49,12 @@ def test_a_stopped_study_goes_on_where_it_was(tmp_path: Path):
     with pytest.raises(KeyboardInterrupt):
         store.point("three", compute("three", stop=True))
     again = Store(path, "a study")
+    store.points["rows"] = {"x": [1.5, -2e-3, 3], "at": [[1, 2.5], [3, 4]], "words": ["[1,", "2]"], "text": "a [ 1 ] b"}
+    store.save()
+    text = path.read_text()
+    assert '"x": [1.5, -0.002, 3]' in text and '"at": [[1, 2.5], [3, 4]]' in text and "a [ 1 ] b" in text
+    assert Store(path, "a study").points["rows"] == store.points.pop("rows")
+    store.save()
     assert again.point("one", compute("one")) == first
     again.point("three", compute("three"))
     assert made == ["one", "three", "three"]

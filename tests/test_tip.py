@@ -99,10 +99,7 @@ def test_notch_that_is_not_resolved_is_warned_of(caplog: pytest.LogCaptureFixtur
 @pytest.mark.parametrize(("reach", "warned"), [(1.2, False), (2.5, True)])
 def test_the_inner_surface_of_a_thin_wall_is_no_notch(reach: float, warned: bool, layers: int,
                                                       caplog: pytest.LogCaptureFixture) -> None:
-    """Fails if the wall of a sac, through which strains fall as 1/r^2, is taken for a notch, or a hole is not.
-
-    Seen to fail without the look at what is below the surface, and with one at the first element alone.
-    """
+    """Fails if the wall of a sac, through which strains fall as 1/r^2, is taken for a notch, or a hole is not."""
     sample, middle = ring_sample(4, 2 if reach < 2 else 6, reach), RADIUS / math.sqrt(2)
     if layers:
         p, t = sample.space.mesh.p, sample.space.mesh.t

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import platform
+import re
 from collections.abc import Mapping
 from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
@@ -22,9 +23,20 @@ __all__ = ["SUMMARY", "read_summary", "versions", "write_summary"]
 SUMMARY = "summary.json"
 
 
-def write_summary(path: str | Path, summary: Mapping[str, Any]) -> None:
-    """Write the results of a run as JSON, arrays as lists. An OutputError names a number that is not finite."""
-    write_atomic(path, json.dumps(_plain(summary, "summary"), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+def write_summary(path: str | Path, summary: Mapping[str, Any], rows: bool = False) -> None:
+    """Write the results of a run as JSON, arrays as lists. An OutputError names a number that is not finite.
+
+    With `rows` a list of numbers is one line, as are points of a few numbers each.
+    """
+    text = json.dumps(_plain(summary, "summary"), indent=1, ensure_ascii=False, allow_nan=False)
+    if rows:  # no text within quotes has a line break
+        for numbers in (r"\[\n[-+.\deE,\s]+\]", r"\[\n(?:\s*\[[-+.\deE, ]{1,60}\],?)+\n\s*\]"):
+            text = re.sub(numbers, _one_line, text)
+    write_atomic(path, text + "\n")
+
+
+def _one_line(found: re.Match[str]) -> str:
+    return re.sub(r"\s+", " ", found[0]).replace("[ ", "[").replace(" ]", "]")
 
 
 def read_summary(folder: Path, name: str = SUMMARY) -> dict[str, Any]:

@@ -87,7 +87,7 @@ class Store:
     def save(self) -> None:
         """Write the file."""
         write_summary(self.path, {"schema": SCHEMA, "study": self.study, "command": _command(sys.orig_argv[1:]),
-                                  "machine": self.machine, "points": self.points})
+                                  "machine": self.machine, "points": self.points}, rows=True)
 
     def _read(self) -> dict[str, Any]:
         try:

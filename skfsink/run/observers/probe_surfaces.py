@@ -11,6 +11,7 @@ import numpy as np
 from ...errors import ParameterError, choose
 from ...fem.places import find_places
 from ...fem.surface import Surface
+from ...loads.pressure import Filling
 from ...scene.scene import Scene
 from .observer import Observer
 from .probe import Columns, LineProbe, MeanProbe, PointProbe, Probe, position_of
@@ -57,7 +58,8 @@ class VolumeProbe(Probe):
     be one line. With a `position` straight lines from the rims to that point close it: the middle of a cavity of which
     planes of symmetry through that point leave a part. Of a body of revolution it is the volume within the rings,
     closed by disks normal to the axis, or by cones to a point on it. Once an element at the boundary has failed there
-    is no such volume, and NaN is written.
+    is no such volume, and NaN is written. With a filling of that boundary it is that of the filling, the undeformed one
+    and what the boundary has swept: below elements that have failed it stays as it was then.
 
     Parameters
     ----------
@@ -81,9 +83,15 @@ class VolumeProbe(Probe):
         if abs(before) < 1e-12 * size**space.volume_dim and (self._apex is not None or self._surface.rims()):
             raise ParameterError(f"the boundary {self.boundary!r} is flat, and encloses nothing")
         self._sign = 1.0 if before > 0.0 else -1.0  # a closed slit has none; it is a cavity
+        self._before = before
+        self._filling = next((k for k, load in enumerate(scene.pressures)
+                              if isinstance(load, Filling) and load.boundary == self.boundary), None)
         return [("volume", "mm^3") if space.volume_dim == 3 else ("area", "mm^2")]
 
     def _values(self, view: View) -> np.ndarray:
+        followers = view.body.loading.followers
+        if self._filling is not None and followers is not None:  # swept is outwards, into the body
+            return np.array([self._sign * (self._before - followers.swept(view.state.u)[self._filling])])
         if view.state.deleted[self._surface.elements].any():
             return np.array([np.nan])
         return np.array([self._sign * self._surface.volume(view.body.space.X + view.state.u, self._apex)])

@@ -46,9 +46,8 @@ class View:
     on_time: whether the event begins at a load time that was given, before anything fails.
     waiting: whether a body from rest in motion has not cracked yet, which may take thousands of records.
     framed: whether a frame was written at this moment by the ranks themselves, without the stress of the whole body.
-    release: greatest energy release rate of a tip [N/mm] at the last look of the first :class:`.EnergyRelease`, which
-        sets it as a run begins, and speed of that tip [m/s], each NaN if it is not known; None without such an
-        observer.
+    release: greatest energy release rate of a tip [N/mm] at the last look of the first :class:`.EnergyRelease`,
+        which sets it as a run begins, and speed of that tip [m/s], each NaN if it is not known; None without one.
     save: writes a checkpoint.   stop_asked: whether the run was asked to stop.
     """
 
