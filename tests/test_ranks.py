@@ -255,6 +255,45 @@ def test_frames_in_pieces_are_those_of_one_file(parted: tuple[Path, Path], tmp_p
     assert index.name in (index.parent / "run.pvd").read_text(encoding="utf-8")
 
 
+LOOKER = """
+import sys
+import numpy as np
+from skfsink import read_deck
+from skfsink.fields.momentum import Momentum
+from skfsink.fields.stress import cauchy_stress
+from skfsink.run import Observer, run
+
+class Looker(Observer):
+    seen = 0
+    def __init__(self):
+        self.every = 1e-6
+    def look(self, view):
+        state, whole = view.state, view.body.momentum
+        alone = Momentum(whole.space, whole.material)
+        alone.set_gamma(state.gamma, state.deleted)
+        force = alone.force(state.u)
+        assert np.allclose(whole.W, alone.W, rtol=1e-12) and np.allclose(whole.gamma, alone.gamma, rtol=1e-12)
+        assert np.allclose(view.stress, cauchy_stress(alone, state.u), rtol=1e-9)
+        assert not view.crushed.any() and "pattern" not in vars(view.body.density)
+        Looker.seen += 1
+        assert np.allclose(whole.backend.mean_force(), alone.backend.mean_force(), rtol=1e-12)
+        assert np.allclose(whole.force(state.u), force, atol=1e-12 * np.abs(force).max())
+
+run(read_deck(sys.argv[1]).scene(), sys.argv[2], [Looker()], quiet=True)
+print("seen", Looker.seen, file=sys.stderr)
+"""
+
+
+@ranks
+@metis
+def test_an_observer_sees_the_whole_body(parted: tuple[Path, Path], tmp_path: Path) -> None:
+    """Fails if energy, density or stress of the whole body is of another moment, or it cannot be asked for a force."""
+    script = tmp_path / "script.py"
+    script.write_text(LOOKER, encoding="utf-8")
+    said = finished(on(2, "-m", "skfsink.methods.ranks", script, parted[0], tmp_path / "run"))
+    assert int(said.split("seen")[1]) > 3, said
+
+
 @ranks
 @metis
 def test_a_part_that_one_rank_cannot_read(parted: tuple[Path, Path], tmp_path: Path) -> None:
