@@ -7,7 +7,8 @@ from on_ranks import COMM, check, stretched, whole_body
 
 from skfsink.fem.direct import Factorization
 from skfsink.fem.pattern import Pattern
-from skfsink.fem.petsc import PETSC, OnOneRank
+from skfsink.fem.petsc import OnOneRank
+from skfsink.fem.petsc_matrix import PETSC
 from skfsink.fields.body import Body
 from skfsink.methods.controls import ExplicitControls
 from skfsink.methods.ranks.part import parts_of

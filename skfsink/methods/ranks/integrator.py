@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...fem.petsc import PETSC, check
+from ...fem.petsc_matrix import PETSC, check
 from ...fields.body import Body, BodyScene
 from ...fields.state import State
 from ..controls import EventControls
