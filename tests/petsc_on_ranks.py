@@ -7,7 +7,8 @@ from on_ranks import COMM, check, stretched, whole_body
 
 from skfsink.fem.direct import Factorization
 from skfsink.fem.pattern import Pattern
-from skfsink.fem.petsc import PETSC, OnOneRank
+from skfsink.fem.petsc import OnOneRank
+from skfsink.fem.petsc_matrix import PETSC
 from skfsink.fields.body import Body
 from skfsink.methods.controls import ExplicitControls
 from skfsink.methods.ranks.part import parts_of
@@ -31,10 +32,10 @@ def check_solver(name: str, body: Body, u: np.ndarray, dim: int) -> None:
         assert factors.factorize(data) and alone.factorize(data)
         tangent.assemble(share * u[numbers.nodes], body.momentum.gamma[numbers.elements], True)
         check("definite", tangent.prepare(), 1.0, 0.0)
-        x, iterations, met = tangent.conjugate(b[own], 1e-11, 500)
+        x, iterations, met = tangent.conjugate(b[own], 1e-9, 500)
         check(f"{name}: met", met, 1.0, 0.0)
-        check(f"{name}: solution", x, factors.solve(b)[own], 1e-7)
-        check(f"{name}: iterations", iterations, alone.conjugate(data, b, 1e-11, 500)[1], 0.3)
+        check(f"{name}: solution", x, factors.solve(b)[own], 1e-5)
+        check(f"{name}: iterations", iterations, alone.conjugate(data, b, 1e-9, 500)[1], 0.3)
     if alone.exact:
         check("substitution", tangent.substitute(b[own]), factors.solve(b)[own], 1e-7)
         bent = -(1.0 - SQUEEZED) * space.X * np.eye(dim)[1]

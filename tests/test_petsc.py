@@ -14,7 +14,7 @@ import pytest
 from plates import SMALL
 
 from skfsink.errors import ParameterError
-from skfsink.fem.petsc import PETSC, check
+from skfsink.fem.petsc_matrix import PETSC, check
 from skfsink.methods.ranks import integrator
 from skfsink.results.history import History
 

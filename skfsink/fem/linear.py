@@ -10,7 +10,8 @@ import numpy as np
 from .direct import Factorization
 from .multigrid import Multigrid
 from .pattern import Pattern
-from .petsc import PETSC, OnOneRank, Petsc
+from .petsc import OnOneRank, Petsc
+from .petsc_matrix import PETSC
 from .space import Space
 
 __all__ = ["LINEAR", "Solver", "solver"]

@@ -1,7 +1,7 @@
 """Conjugate gradients with algebraic multigrid for tangents: what factors of a million unknowns are too large for.
 
-The hierarchy is smoothed aggregation by pyamg, or GAMG by PETSc (:mod:`.petsc`). Both are given the rigid motions of
-the body, which its energy hardly resists; the number of iterations then hardly grows with the size.
+The hierarchy is smoothed aggregation by pyamg, or GAMG by PETSc (:mod:`.petsc_matrix`). Both are given the rigid
+motions of the body, which its energy hardly resists; the number of iterations then hardly grows with the size.
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from ...errors import ParameterError
-from ...fem.petsc import PETSC, check
+from ...fem.petsc_matrix import PETSC, check
 from ...fields.body import Body, BodyScene
 from ...fields.state import State
 from ..controls import EventControls

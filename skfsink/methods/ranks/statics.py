@@ -9,7 +9,8 @@ import numpy as np
 
 from ...errors import ConvergenceError, ParameterError
 from ...fem.linear import Solver
-from ...fem.petsc import PETSC, Petsc
+from ...fem.petsc import Petsc
+from ...fem.petsc_matrix import PETSC
 from ...fields.body import Body, BodyControls
 from ...loads.schedule import Loading
 from ..controls import ExplicitControls, StaticsControls

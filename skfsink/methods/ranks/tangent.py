@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...fem.pattern import Pattern
-from ...fem.petsc import Matrix
+from ...fem.petsc_matrix import Matrix
 from .part import PartOfBody
 
 if TYPE_CHECKING:
@@ -32,6 +32,8 @@ class TangentOfPart:
 
     def take(self, part: PartOfBody, solver: str) -> None:
         """Take up a part of the body, and the solver of that name."""
+        if self._matrix is not None:  # that of an earlier analysis
+            self.release()
         self._momentum = part.balance(self._comm)
         space, free = self._momentum.space, part.loading.free
         self._pattern = Pattern(space, space.dim, free, upper=True)
