@@ -8,7 +8,6 @@ motions. PETSc's options are those of the prefix `skfsink_`, as in PETSC_OPTIONS
 
 from __future__ import annotations
 
-from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -30,9 +29,13 @@ CHUNK = 200_000   # rows whose values are given to PETSc at once
 
 
 def check(name: str) -> None:
-    """Refuse a solver whose library is not installed (ParameterError). It is not loaded, which all ranks have to do."""
-    if name in PETSC and find_spec("petsc4py") is None:
-        raise _missing(name, "it is not installed")
+    """Refuse a solver whose library is not there (ParameterError). PETSc itself is not begun: all ranks have to do it.
+    """
+    if name in PETSC:
+        try:
+            import petsc4py  # noqa: F401
+        except ImportError as error:
+            raise _missing(name, error) from None
 
 
 def _missing(name: str, why: object) -> ParameterError:

@@ -24,13 +24,13 @@ import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Any
 
 from cyclopts import Parameter
 
 from ..errors import ConvergenceError, ParameterError
+from ..fem.petsc_matrix import PETSC, check
 from ..run.display import Display
 from .chart import page
 from .part import Part, Planned, Points
@@ -73,10 +73,18 @@ class _Solve:
 
 def plan(quick: bool) -> list[Planned]:
     """From small to large tangents, solver by solver."""
-    there = find_spec("petsc4py") is not None
+    there = _has_petsc()
     return [Planned(f"{linear}/{ranks}/{size}", _Solve(linear, ranks, size), size * 1e-4)
             for size in (SIZES[:1] if quick else SIZES) for linear, ranks, most in WAYS
             if size <= most and (there or "petsc" not in linear)]
+
+
+def _has_petsc() -> bool:
+    try:
+        check(PETSC[0])
+    except ParameterError:
+        return False
+    return True
 
 
 # --- what comes out ---
