@@ -157,7 +157,7 @@ def test_states_of_a_run(copy: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert seen(copy) == ("silent", "no word for 11 min 40 s; whether it goes on is known on elsewhere alone")
     goes_on(copy)
     os.utime(copy / STATUS, (time.time() - 90, time.time() - 90))
-    assert seen(copy) == ("running", "no word for 1 min 30 s: a step takes long, or it hangs")
+    assert seen(copy) == ("running", "no word for 1 min 30 s: what it does takes long, or it hangs")
     (copy / HOLDER).unlink(), (copy / STATUS).unlink()
     assert seen(copy) == ("interrupted", "no process is in it")
 

@@ -39,8 +39,8 @@ def shot(folder: Path) -> bytes:
 
 
 def main() -> None:
-    """Write the picture, in few colours."""
-    Image.open(io.BytesIO(shot(Path(sys.argv[1])))).convert("RGB").quantize(128).save(TARGET, optimize=True)
+    """Write the picture."""
+    Image.open(io.BytesIO(shot(Path(sys.argv[1])))).convert("RGB").save(TARGET, optimize=True)
     print(TARGET)
 
 

@@ -22,7 +22,8 @@ __all__ = ["Display", "Interrupt"]
 class Display:
     """A progress line a phase with the figures below it; a line every ten seconds where there is no terminal.
 
-    Memory: the phase begun last, which `update` shows and `phase` ends, and the last lines: `status` gives both.
+    Memory: the phase begun last, which `update` shows and `phase` ends, and the last lines, to which `say` adds;
+    `status` gives both.
 
     Attributes
     ----------

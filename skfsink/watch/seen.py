@@ -122,7 +122,7 @@ def _state(place: Place, run: Run | None, status: Status | None, holder: Holder 
         quiet = _age(place.folder / STATUS)
         if holder.alive is None and quiet > SILENT:
             return "silent", f"no word for {duration(quiet)}; whether it goes on is known on {holder.host} alone"
-        return "running", f"no word for {duration(quiet)}: a step takes long, or it hangs" if quiet > LONG else ""
+        return "running", f"no word for {duration(quiet)}: what it does takes long, or it hangs" if quiet > LONG else ""
     if not (place.folder if place.failure is None else place.failure.parent).is_dir():
         return "gone", "its folder is not there any more"
     if place.failure is not None and place.failure.is_file():
