@@ -13,7 +13,7 @@ from ..fields.fragments import joined
 from ..results.frame import SPENT, Frame
 
 __all__ = ["FACETS", "OBLIQUE", "Body", "View", "bodies", "body", "extent", "fastest",
-           "live_elements", "outer_facets", "speed"]
+           "live_elements", "outer_facets", "round_up", "speed"]
 
 View = tuple[float, float]          # azimuth and elevation [degrees] from which a body in space is seen
 OBLIQUE = (-75.0, 60.0)
@@ -110,9 +110,13 @@ def fastest(frames: Sequence[Frame]) -> float:
     """A round speed [m/s] that all but the fastest few of the nodes that hold stay below; frames may lack it."""
     speeds = [speed(frame)[frame.gamma >= CRACKED] for frame in frames if frame.v is not None]
     all_of_them = np.concatenate(speeds)
-    top = float(np.quantile(all_of_them, 0.999)) if all_of_them.size else 0.0
-    unit = 10.0 ** np.floor(np.log10(max(top, 1e-9)))
-    return float(unit * next(step for step in (1, 1.5, 2, 3, 4, 5, 6, 8, 10) if step * unit >= top))
+    return round_up(float(np.quantile(all_of_them, 0.999)) if all_of_them.size else 0.0)
+
+
+def round_up(value: float) -> float:
+    """The next of 1, 1.5, 2, 3, 4, 5, 6, 8 times a power of ten that is not less; 1e-9 at the least."""
+    unit = 10.0 ** np.floor(np.log10(max(value, 1e-9)))
+    return float(unit * next(step for step in (1, 1.5, 2, 3, 4, 5, 6, 8, 10) if step * unit >= value))
 
 
 def _held(values: np.ndarray, holds: np.ndarray) -> np.ndarray:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from ...fields.frame_fields import ON_REQUEST
 from ...fields.stress import pressure, von_mises
 from ...results.series import Series
 from ...system.files import prepare_folder
@@ -24,6 +25,7 @@ class Frames(Observer):
     Parameters
     ----------
     every: time between frames of the event [s].   every_passes: passes between them in a quasi-static one.
+    fields: names of :data:`.frame_fields.ON_REQUEST` that frames have besides the others.
 
     Attributes
     ----------
@@ -34,8 +36,8 @@ class Frames(Observer):
     LOADING = 50.0  # of the way of the loading: its frames are at least that part of it apart
     kept = ("times", "loading_times", "moments", "framed")
 
-    def __init__(self, every: float, every_passes: int = 10) -> None:
-        self.every, self.every_passes = every, every_passes
+    def __init__(self, every: float, every_passes: int = 10, fields: Sequence[str] = ()) -> None:
+        self.every, self.every_passes, self.fields = every, every_passes, tuple(fields)
         self.times: list[float] = []
         self.loading_times: list[float] = []
         self.moments: dict[str, int] = {}
@@ -89,12 +91,14 @@ class Frames(Observer):
 
     def _add(self, series: Series, view: View) -> None:
         momentum, space, state, stress = view.body.momentum, view.body.space, view.state, view.stress
+        others = {name: ON_REQUEST[name](momentum, state.u, stress) for name in self.fields}
         series.add(
             state.time,
             {"displacement": state.u, "velocity": state.v, "gamma": state.gamma},
             {"deleted": state.deleted.astype(np.int8), "W": space.element_mean(np.minimum(momentum.W, 1e3)),
              "gamma_element": space.element_mean(momentum.gamma), "stress": stress, "pressure": pressure(stress),
-             "von_mises": von_mises(stress), "crushed": np.isnan(stress).any(axis=1).astype(np.int8), **self._regions})
+             "von_mises": von_mises(stress), "crushed": np.isnan(stress).any(axis=1).astype(np.int8), **others,
+             **self._regions})
 
     def finish(self, view: View) -> None:
         """Wait until all frames are written."""
