@@ -26,7 +26,7 @@ def field_picture(space: Space, frames: Sequence[Frame], field: str, path: str |
     """
     values = [nodal(space, frame, field) for frame in frames]
     bodies, box, ratio = deformed.bodies(space, frames, view, values)
-    scale = scale_of(frames, values, field)
+    scale = scale_of(space, frames, values, field)
     figure, axes = page(len(frames), ratio)
     draw_bodies(axes, bodies, [frame.title for frame in frames], box, scale.colours)
     bar = figure.colorbar(scale.colours, ax=axes, aspect=25, pad=0.02, shrink=0.8, extend=scale.extend)

@@ -141,7 +141,7 @@ def _rendered(run: Run, frames: Sequence[Frame], field: str, width: int, view: V
     space, camera = run.scene.space, camera_of(view or run.scene.view)
     box = bounds(space, frames, camera)
     values = [nodal(space, frame, field) for frame in frames]
-    scale = scale_of(frames, values, field)
+    scale = scale_of(space, frames, values, field)
     ratio = min(float(np.divide(*(box[1] - box[0])[::-1])), TALLEST)
     figure = Figure((width / DPI, width / DPI * (0.82 * ratio + 0.06)), dpi=DPI)
     canvas = FigureCanvasAgg(figure)

@@ -20,7 +20,7 @@ from .plot import GAMMA_SCALE, SPEED_MAP
 
 __all__ = ["FIELDS", "Scale", "cells_of", "nodal", "scale_of"]
 
-MOST = 0.995  # of the values of the nodes that hold are within the colours
+MOST = 0.99  # of the volume that holds has values within the colours, in each frame
 _BOTH = matplotlib.colormaps["RdBu_r"]
 
 #: What can be drawn, with its unit, by name.
@@ -80,18 +80,27 @@ def nodal(space: Space, frame: Frame, field: str) -> np.ndarray:
     return np.asarray(np.divide(total, there, out=np.zeros(n), where=there > 0))
 
 
-def scale_of(frames: Sequence[Frame], values: Sequence[np.ndarray], field: str) -> Scale:
+def scale_of(space: Space, frames: Sequence[Frame], values: Sequence[np.ndarray], field: str) -> Scale:
     """Colours for the values (n,) of a field in the frames."""
     label = FIELDS[field]
     if field == "gamma":
         return Scale(GAMMA_SCALE, label, "neither")
     if field == "speed":
         return Scale(ScalarMappable(Normalize(0, deformed.fastest(frames)), SPEED_MAP), label, "max")
-    held = np.concatenate([value[frame.gamma >= CRACKED] for frame, value in zip(frames, values)])
-    held = held if held.size else np.zeros(1)
-    low, high = float(np.quantile(held, 1.0 - MOST)), float(np.quantile(held, MOST))
+    volume = np.bincount(space.conn.ravel(), np.repeat(space.extent, space.conn.shape[1]), space.n_nodes)
+    ends = [_within(value[holds], volume[holds]) for frame, value in zip(frames, values)
+            if (holds := frame.gamma >= CRACKED).any()] or [(0.0, 0.0)]
+    low, high = min(end for end, _ in ends), max(end for _, end in ends)
     if field in ("pressure", "principal_stress") and low < -0.05 * abs(high):  # pushed here, pulled there
         most = deformed.round_up(max(-low, high))
         return Scale(ScalarMappable(Normalize(-most, most), _BOTH), label, "both")
     base = 1.0 if field == "stretch" else 0.0
     return Scale(ScalarMappable(Normalize(base, base + deformed.round_up(high - base)), SPEED_MAP), label, "max")
+
+
+def _within(values: np.ndarray, volume: np.ndarray) -> tuple[float, float]:
+    """Values (m,) between which all but a share of the volume (m,) lies at either end."""
+    order = np.argsort(values)
+    share = np.cumsum(volume[order]) / volume.sum()
+    low, high = np.searchsorted(share, [1.0 - MOST, MOST])
+    return float(values[order[low]]), float(values[order[min(high, order.size - 1)]])

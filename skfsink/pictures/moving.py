@@ -50,7 +50,7 @@ def drawn(space: Space, frames: Sequence[Frame], field: str, view: View = OBLIQU
     Axes and colour bar are drawn once.
     """
     values = [nodal(space, frame, field) for frame in frames]
-    scale = scale_of(frames, values, field)
+    scale = scale_of(space, frames, values, field)
     last, box, ratio = deformed.bodies(space, frames[::-8], view)
     inches = _SIZE / max(1, ratio)
     figure = Figure((inches + 1.3, inches * ratio + 0.75), dpi=width / (inches + 1.3) if width else _DPI,

@@ -180,7 +180,11 @@ def loading_picture(history: History, path: str | Path, title: str = "", event: 
         ax.legend(*(entry[::-1] for entry in ax.get_legend_handles_labels()), loc="best")
     ax.set_ylabel(f"load ({unit})")
     low.plot(np.append(0, x), np.append(1, gamma), color=RED)
-    low.set(xlabel="displacement (mm)", ylabel=r"least $\gamma$", ylim=(0, 1.05))
+    least = float(gamma.min()) if len(gamma) else 1.0
+    low.set(xlabel="displacement (mm)", ylabel=r"least $\gamma$", ylim=(min(0.95, 1.1 * least - 0.1), None))
+    for limit, data in ((ax.set_xlim, ax.dataLim.intervalx), (ax.set_ylim, ax.dataLim.intervaly)):
+        if data[0] >= 0.0:  # nothing moved back: the corner is the unloaded body
+            limit(0, None)
     figure.align_ylabels()
     save(figure, path, title)
 
