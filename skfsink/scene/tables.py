@@ -28,13 +28,13 @@ from ..material import MATERIALS, own_constants
 from ..material.regions import RegionLaw, one_bulk_modulus
 from ..meshing.cracks import InitialCrack, crack_along, crack_of_elements
 from ..meshing.sample import Sample
-from ..units import Unit
+from ..units import Unit, kind_and_unit
 from .course_file import SUFFIX
 from .marks import MOST, Course, Place, PressureCourse, Still, Vector, Way, plain
 from .typed import Mistake, Record
 
-__all__ = ["beside", "body_forces_of", "cracks_of", "grips_of", "pressures_of", "read_tables", "regions_of",
-           "tractions_of", "velocities_of"]
+__all__ = ["beside", "body_forces_of", "cracks_of", "grips_of", "number_fields", "pressures_of", "read_tables",
+           "regions_of", "tractions_of", "velocities_of"]
 
 AXES = ("x", "y", "z")
 SINGULAR = {"body_forces": "body force", "velocities": "velocity"}
@@ -74,6 +74,12 @@ WITHOUT_NAME = ("body_forces", "velocities")  # kinds whose first field may be l
 NEEDED = {"fillings": ("boundary", "inflow", "compliance"), **dict.fromkeys(WITHOUT_NAME, ())}
 RECORDS = {kind: Record(types, partial(_message, kind), needed=NEEDED.get(kind, (next(iter(types)),)), finite=True)
            for kind, types in TYPES.items()}
+
+
+def number_fields(kind: str) -> dict[str, str]:
+    """Fields of a table of a kind that are plain numbers, with their units."""
+    found = {name: kind_and_unit(annotation) for name, annotation in TYPES[kind].items()}
+    return {name: unit for name, (type_, unit) in found.items() if type_ is float}
 
 
 def read_tables(kind: str, tables: Any) -> tuple[dict[str, Any], ...]:
