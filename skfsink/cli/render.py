@@ -8,7 +8,8 @@ __all__ = ["render"]
 
 
 def render(folder: Path, *, film: bool = False, moment: str = "end", field: str = "gamma", width: int = 900,
-           phase: str = "event", azimuth: float | None = None, elevation: float | None = None, out: Path | None = None) -> None:
+           phase: str = "event", azimuth: float | None = None, elevation: float | None = None,
+           out: Path | None = None) -> None:
     """Draw the body of a run, deformed and cut open along the crack, in colours of a field, still or moving.
 
     Bodies in space need the extra `view`, which also makes films as MP4.

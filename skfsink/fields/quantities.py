@@ -63,7 +63,7 @@ def _principal(momentum: Momentum, state: State, places: Places) -> np.ndarray:
 
 
 def principal_stretches(momentum: Momentum, u: np.ndarray, elements: np.ndarray) -> np.ndarray:
-    """Principal stretches (m, 3) of the mean F of elements (m,) at `u` (n, dim), descending; NaN where it is inside out.
+    """Principal stretches (m, 3) of the mean F of elements (m,) at `u` (n, dim), descending; NaN if it is inside out.
 
     Of a thin sheet the stretch across it is that which leaves no stress.
     """

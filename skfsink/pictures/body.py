@@ -13,7 +13,7 @@ from ..fields.fragments import joined
 from ..results.frame import SPENT, Frame
 
 __all__ = ["FACETS", "OBLIQUE", "Body", "View", "bodies", "body", "extent", "fastest",
-           "live_elements", "outer_facets", "round_up", "speed"]
+           "live_elements", "outer_facets", "round_up", "speed", "turned"]
 
 View = tuple[float, float]          # azimuth and elevation [degrees] from which a body in space is seen
 OBLIQUE = (-75.0, 60.0)
@@ -88,8 +88,7 @@ def body(space: Space, frame: Frame, view: View, colour: np.ndarray | None = Non
         edge = outer_facets(space, np.arange(space.n_elements))[elements] & (gamma[:, facets].min(axis=2) >= CRACKED)
         faces = np.dstack([x, gamma, np.ones_like(gamma), value])[:, [0, 1, 3, 2]]
         return Body(_triangles(faces), x[:, facets][edge], extent(space, elements, x, gamma))
-    (ca, ce), (sa, se) = np.cos(np.radians(view)), np.sin(np.radians(view))
-    x = x @ np.array([[-sa, ca, 0], [-ca * se, -sa * se, ce], [ca * ce, sa * ce, se]]).T  # right, up, to the observer
+    x = x @ turned(view).T
     box, surface = extent(space, elements, x[:, :, :2], gamma), outer_facets(space, elements)
     x, gamma, value = x[:, facets][surface], gamma[:, facets][surface], value[:, facets][surface]
     normal = np.cross(x[:, 2] - x[:, 0], x[:, 3] - x[:, 1])
@@ -97,6 +96,12 @@ def body(space: Space, frame: Frame, view: View, colour: np.ndarray | None = Non
     faces = np.dstack([x[:, :, :2], gamma, np.broadcast_to(light[:, None], gamma.shape), value])
     seen = np.flatnonzero(normal[:, 2] > 0)
     return Body(_triangles(faces[seen[np.argsort(x[seen, :, 2].mean(axis=1))]]), np.zeros((0, 2, 2)), box)
+
+
+def turned(view: View) -> np.ndarray:
+    """Unit vectors to the right, up, and to the observer, (3, 3)."""
+    (ca, ce), (sa, se) = np.cos(np.radians(view)), np.sin(np.radians(view))
+    return np.array([[-sa, ca, 0], [-ca * se, -sa * se, ce], [ca * ce, sa * ce, se]])
 
 
 def speed(frame: Frame) -> np.ndarray:

@@ -17,6 +17,7 @@ from ..results.probes import read_probes
 from ..results.result import Result
 from ..results.stored_series import StoredSeries
 from ..scene.scene import Scene
+from .fibre_picture import fibre_picture
 from .field_picture import field_picture
 from .looks import cells_of
 from .moving import animation, few
@@ -32,7 +33,8 @@ LATEST = "last frame"
 
 def draw_run(scene: Scene, folder: Path, series: str, moments: Mapping[str, int]) -> None:
     """`density`, `speed` (dynamic), `loading`, `energies`, `tip` and `animation.gif` of a run; `probes` of one with
-    probes, `fragments` of a body that has come apart, and the fields that its scene asks for.
+    probes, `fibres` of one with fibres, `fragments` of a body that has come apart, and the fields that its scene asks
+    for.
 
     They are drawn from the files in `folder`, in the format that the scene says. `series` names the one to draw, "run",
     or "loading" of a body that did not fail; `moments` has the numbers of the frames at key moments.
@@ -41,6 +43,8 @@ def draw_run(scene: Scene, folder: Path, series: str, moments: Mapping[str, int]
     kind = "quasi-static" if quasistatic else f"dynamic, {scene.controls.integrator}"
     run = _Files(scene, folder, f"{scene.title}, mesh {scene.sample.name}, {kind}", series, moments)
     _draw_probes(run)
+    if (fibres := scene.fibres) is not None:
+        fibre_picture(scene.space, fibres, run.path("fibres"), f"{scene.title}, mesh {scene.sample.name}", scene.view)
     if series == "loading":
         run.title = f"{scene.title}, mesh {scene.sample.name}: " + (
             "not finished" if LATEST in moments else "nothing failed")

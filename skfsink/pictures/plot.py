@@ -45,9 +45,10 @@ BANDS = {"sink_stored": ("$D$, from stored energy", "#a63d40"), "sink_kinetic": 
          "numerical": ("numerical", "#9b9b9b")}
 RED, BLUE, SAND = (BANDS[name][1] for name in ("sink_stored", "elastic", "released"))
 STYLE: dict[Any, Any] = {
-    "font.family": "DejaVu Sans", "svg.hashsalt": "skfsink", "font.size": 8, "axes.titlesize": 8, "axes.labelsize": 8, "axes.linewidth": 0.6,
-    "figure.titlesize": 9, "legend.fontsize": 7, "legend.frameon": False, "xtick.labelsize": 7, "ytick.labelsize": 7,
-    "xtick.major.width": 0.6, "ytick.major.width": 0.6, "lines.linewidth": 1.2}
+    "font.family": "DejaVu Sans", "svg.hashsalt": "skfsink", "font.size": 8, "axes.titlesize": 8, "axes.labelsize": 8,
+    "axes.linewidth": 0.6, "figure.titlesize": 9, "legend.fontsize": 7, "legend.frameon": False,
+    "xtick.labelsize": 7, "ytick.labelsize": 7, "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6, "lines.linewidth": 1.2}
 WIDTH, TALLEST, DPI = 7.2, 9.0, 300  # size of a picture [in], dots per inch
 GAMMA_SCALE = ScalarMappable(Normalize(0, 1), GAMMA_MAP)
 SPEED_MAP = matplotlib.colormaps["viridis"]

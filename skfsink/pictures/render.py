@@ -69,8 +69,8 @@ def surface(space: Space, frame: Frame, values: np.ndarray | None = None) -> Any
     """The surface of what is left of the body, as a pyvista `PolyData` on the deformed shape.
 
     It ends where gamma falls below 0.1, and is closed there by the lips of the crack. Its point data are `gamma` and,
-    if the frame has velocities, `speed` [mm/s]; with nodal `values` (n,) also `value`. It is cut in the undeformed body, where a spent node carries neither
-    displacement nor velocity: the lips move with the nodes that are not spent.
+    if the frame has velocities, `speed` [mm/s]; with nodal `values` (n,) also `value`. It is cut in the undeformed
+    body, where a spent node carries neither displacement nor velocity: the lips move with the nodes that are not spent.
 
     Raises
     ------

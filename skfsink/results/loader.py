@@ -35,7 +35,7 @@ log = logging.getLogger(__name__)
 #: Units of the fields of a frame.
 FIELD_UNITS = {"displacement": "mm", "velocity": "mm/s", "gamma": "1", "deleted": "1", "W": "MPa", "gamma_element": "1",
                "stress": "MPa", "pressure": "MPa", "von_mises": "MPa", "principal_stress": "MPa",
-               "stretch": "1", "crushed": "1", "region": "1"}
+               "stretch": "1", "crushed": "1", "region": "1", "fibre_1": "1", "fibre_2": "1"}
 #: Rows of :attr:`Run.energies`: name, columns of the history that add up to it, meaning.
 ENERGIES: tuple[tuple[str, tuple[str, ...], str], ...] = (
     ("elastic", ("elastic",), "elastic energy, γ-weighted"),

@@ -49,7 +49,9 @@ class Frames(Observer):
         self._new = memory is None
         space, folder = view.body.space, view.folder / "series"
         self.series, self.loading_series = Series(folder, "run", space), Series(folder, "loading", space)
-        self._regions = {"region": view.scene.region_numbers} if view.scene.regions else {}
+        self._still = {"region": view.scene.region_numbers} if view.scene.regions else {}
+        if (fibres := view.scene.fibres) is not None:
+            self._still |= {f"fibre_{f + 1}": np.nan_to_num(fibres[:, f]) for f in range(fibres.shape[1])}
         self.series.check(len(self.times))
         self.loading_series.check(len(self.loading_times))
 
@@ -98,7 +100,7 @@ class Frames(Observer):
             {"deleted": state.deleted.astype(np.int8), "W": space.element_mean(np.minimum(momentum.W, 1e3)),
              "gamma_element": space.element_mean(momentum.gamma), "stress": stress, "pressure": pressure(stress),
              "von_mises": von_mises(stress), "crushed": np.isnan(stress).any(axis=1).astype(np.int8), **others,
-             **self._regions})
+             **self._still})
 
     def finish(self, view: View) -> None:
         """Wait until all frames are written."""
