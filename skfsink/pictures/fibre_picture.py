@@ -21,7 +21,7 @@ from .plot import BLUE, RED, STYLE, WIDTH, draw_body, save
 __all__ = ["fibre_picture"]
 
 ACROSS = 32  # lines along the longer side of the picture
-COLOURS = (BLUE, RED)
+COLOURS = (BLUE, RED)  # the first is thicker, to be seen where the second lies on it
 _PLAIN = ScalarMappable(Normalize(0, 1), ListedColormap(["#e3e7ea"]))
 
 
@@ -44,7 +44,7 @@ def fibre_picture(space: Space, fibres: np.ndarray, path: str | Path, title: str
         along = 0.5 * length * (fibres[elements, family] @ turn.T)[:, :2]
         there = np.isfinite(along).all(axis=1)
         lines = np.stack([places - along, places + along], axis=1)[there]
-        ax.add_collection(LineCollection(list(lines), colors=colour, linewidths=0.9), autolim=False)
+        ax.add_collection(LineCollection(list(lines), colors=colour, linewidths=2.2 - 1.4 * family), autolim=False)
     ax.set(xlim=box[:, 0], ylim=box[:, 1], aspect="equal", xlabel="$x$ (mm)", ylabel="$y$ (mm)")
     if space.dim == 3:
         ax.set_axis_off()
