@@ -96,10 +96,11 @@ def _value(value: Any) -> str:
 def _groups(plot: Axes, pairs: np.ndarray, label: str, colour: str) -> None:
     """Points, and beside those of the same value their mean and standard deviation."""
     values = np.unique(pairs[:, 0])
-    width = 0.02 * (np.ptp(values) if len(values) > 1 else 1.0)
-    plot.plot(pairs[:, 0] - width / 2, pairs[:, 1], "o", ms=4, mfc="none", color=colour, alpha=0.7)
     groups = [pairs[pairs[:, 0] == value, 1] for value in values]
-    if any(len(group) > 1 for group in groups):
+    several = any(len(group) > 1 for group in groups)
+    width = 0.02 * (np.ptp(values) if len(values) > 1 else 1.0) if several else 0.0
+    plot.plot(pairs[:, 0] - width / 2, pairs[:, 1], "o", ms=4, mfc="none", color=colour, alpha=0.7)
+    if several:
         mean = [group.mean() for group in groups]
         spread = [group.std(ddof=1) if len(group) > 1 else 0.0 for group in groups]
         plot.errorbar(values + width / 2, mean, spread, fmt="s", ms=5, capsize=4, color=colour,
