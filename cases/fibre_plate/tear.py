@@ -1,4 +1,4 @@
-"""Draws the direction of the tear over that of the fibres: `python cases/fibre_plate/tear.py SWEEP/sweep.csv tear.png`."""
+"""Draws the direction of the tear over that of the fibres: `python cases/fibre_plate/tear.py SWEEP.csv tear.png`."""
 
 from __future__ import annotations
 

@@ -44,7 +44,8 @@ def fibre_picture(space: Space, fibres: np.ndarray, path: str | Path, title: str
         along = 0.5 * length * (fibres[elements, family] @ turn.T)[:, :2]
         there = np.isfinite(along).all(axis=1)
         lines = np.stack([places - along, places + along], axis=1)[there]
-        ax.add_collection(LineCollection(list(lines), colors=colour, linewidths=1.0 if families == 1 else 2.2 - 1.4 * family), autolim=False)
+        width = 1.0 if families == 1 else 2.2 - 1.4 * family
+        ax.add_collection(LineCollection(list(lines), colors=colour, linewidths=width), autolim=False)
     ax.set(xlim=box[:, 0], ylim=box[:, 1], aspect="equal", xlabel="$x$ (mm)", ylabel="$y$ (mm)")
     if space.dim == 3:
         ax.set_axis_off()
