@@ -27,9 +27,11 @@ from skfsink.methods.integrators import INTEGRATORS
 from skfsink.methods.statics import Statics
 from skfsink.results.history import HISTORY_COLUMNS
 from skfsink.run.observers.history import VALUES
+from skfsink.scene.deck import Deck, read_deck
 from skfsink.scene.options import Options
 from skfsink.scene.registry import CASES, find_case
 from skfsink.sweep.vary import read_variation
+from skfsink.system.shipped import deck_path
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = {path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8")
@@ -203,6 +205,13 @@ def said_of(line: str, capsys: pytest.CaptureFixture[str]) -> str:
     return capsys.readouterr().out
 
 
+def deck_of(name: str) -> Deck:
+    """The deck of a command: one that is shipped, or of a case for a file that pages only name."""
+    path = deck_path(Path(name))
+    return read_deck(path if path.is_absolute() else ROOT / path) if (ROOT / path).is_file() else Deck(
+        "single_edge_notch", {})
+
+
 @pytest.mark.parametrize("line", commands())
 def test_commands_are_understood(line: str, capsys: pytest.CaptureFixture[str], tmp_path: Path,
                                  monkeypatch: pytest.MonkeyPatch) -> None:
@@ -216,7 +225,7 @@ def test_commands_are_understood(line: str, capsys: pytest.CaptureFixture[str], 
     help_ = said_of(line, capsys)
     for option, value in zip(words, [*words[1:], ""]):
         assert not option.startswith("--") or re.search(rf"{option}\b", help_), option
-        assert option != "--vary" or read_variation(value, find_case("single_edge_notch"))
+        assert option != "--vary" or read_variation(value, deck_of(words[2]))
 
 
 # --- messages ---

@@ -17,6 +17,7 @@ from skfsink.pictures.body import body
 from skfsink.pictures.film import camera_of, film, still
 from skfsink.pictures.render import bounds
 from skfsink.results.frame import read_frame
+from skfsink.results.series import Series
 
 pytest.importorskip("pyvista", reason="pyvista, the extra view, is not installed")
 
@@ -66,14 +67,29 @@ def test_a_still_by_the_command(shell: Path, tmp_path: Path, capsys: pytest.Capt
     assert skfsink.load(shell).frames.times[3] == 3 * STEP
 
 
+def test_a_field_of_elements_is_rendered(tmp_path: Path) -> None:
+    """Fails if a body in space is not in the colours of the field: half of it at 0, half at the greatest value."""
+    folder = write_run(tmp_path / "shell", scene_of("cylindrical_shell"))
+    run = skfsink.load(folder)
+    space = run.scene.space
+    right = space.X[space.conn].mean(axis=1)[:, 0] > 0
+    Series(folder / "series", "run", space).resume(0)
+    series = Series(folder / "series", "run", space)
+    series.add(0.0, {"displacement": 0 * space.X, "velocity": 0 * space.X, "gamma": np.ones(space.n_nodes)},
+               {"deleted": np.zeros(space.n_elements, np.int8), "von_mises": right.astype(float)})
+    series.flush()
+    still(skfsink.load(folder), tmp_path / "a.png", 0, "von_mises", width=400)
+    picture = np.asarray(Image.open(tmp_path / "a.png").convert("RGB"), float)[:, :320].reshape(-1, 3)
+    yellow = (picture[:, 0] > 1.5 * picture[:, 2]) & (picture[:, 1] > 1.5 * picture[:, 2])
+    purple = (picture[:, 2] > 1.3 * picture[:, 1]) & (picture[:, 0] < 120)
+    assert min(yellow.sum(), purple.sum()) > 0.3 * max(yellow.sum(), purple.sum()) > 1000
+
+
 def test_refusals(shell: Path, tmp_path: Path) -> None:
     """Fails if what cannot be shown is not one line that says what can."""
     run = skfsink.load(shell)
-    with pytest.raises(ParameterError, match=r"^field must be one of gamma, speed; got 'stress'$"):
+    with pytest.raises(ParameterError, match=r"^field must be one of gamma, speed, von_mises, .*; got 'stress'$"):
         still(run, tmp_path / "a.png", field="stress")
     with pytest.raises(OutputError, match=r"has no frame 9; it has onset, branching, arrival, end, or 0 to 5$"):
         still(run, tmp_path / "a.png", 9)
-    plate = skfsink.load(write_run(tmp_path / "plate", scene_of("single_edge_notch")))
-    with pytest.raises(OutputError, match=r"holds a plane body: its pictures are density.png and animation.gif"):
-        film(plate, tmp_path / "a.gif")
     assert not list(tmp_path.glob("a.*"))

@@ -12,8 +12,9 @@ from PIL import Image
 
 from skfsink.fem.space import Space
 from skfsink.pictures import body as deformed
-from skfsink.pictures import plot
-from skfsink.pictures.plot import animation, comparison_picture, density_picture, ledger_picture, tip_picture
+from skfsink.pictures import moving, plot
+from skfsink.pictures.moving import animation
+from skfsink.pictures.plot import comparison_picture, density_picture, ledger_picture, tip_picture
 from skfsink.results.frame import Frame
 from skfsink.results.history import HISTORY_COLUMNS
 
@@ -256,7 +257,7 @@ def test_animation_has_a_picture_for_each_frame_and_lasts_some_seconds(plate: Sp
 
 def test_animation_of_a_long_run_leaves_frames_out(plate: Space, tmp_path: Path,
                                                    monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(plot, "GIF_FRAMES", 3)
+    monkeypatch.setattr(moving, "GIF_FRAMES", 3)
     animation(plate, [cracked(plate, 1.2 + 0.3 * i, time=1e-5 * i) for i in range(8)], tmp_path / "run.gif")
     with Image.open(tmp_path / "run.gif") as gif:
         assert gif.n_frames == 3

@@ -29,7 +29,7 @@ from skfsink.system import shipped
 shipped.data_roots = lambda: (Path(sys.argv[1]),)
 skfsink.run.compute.draw_run = lambda *_: None
 from skfsink.scene.registry import find_case, read_scene
-from skfsink.scene.deck import read_deck
+from skfsink.scene.deck import Deck, read_deck
 from skfsink.cli.cases import list_cases
 from skfsink.cli.show import deck_text
 from skfsink.report.scenes import command_line, meanings
@@ -39,7 +39,8 @@ from skfsink.sweep.vary import read_variation
 case, folder = find_case("double_edge_notch"), Path(sys.argv[1])
 list_cases()
 print(deck_text(case.name))
-assert read_variation("shear=1 um/s..2 um/s:2", case) == ("shear", [1e-3, 2e-3])
+found = read_variation("shear=1 um/s..2 um/s:2", Deck(case.name, {}))
+assert (found.name, found.values) == ("shear", [1e-3, 2e-3])
 (folder / "deck.toml").write_text('case = "double_edge_notch"\\n[parameters]\\nmesh = "coarse"\\nshear = "1 um/s"\\n'
                                   'length_scale = 0.9\\nevent_time = "1 us"\\n')
 result = read_deck(folder / "deck.toml").run(out=folder / "run", quiet=True)

@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 import psutil
 import pytest
+from matplotlib.figure import Figure
 from PIL import Image
 from plates import invoke_program, plate
 
@@ -24,12 +25,13 @@ import skfsink.sweep.plan
 from skfsink.errors import OutputError, ParameterError
 from skfsink.meshing.vtu import write_mesh
 from skfsink.results.history import History
-from skfsink.scene.deck import read_deck
+from skfsink.scene.deck import Deck, read_deck
 from skfsink.scene.registry import find_case
 from skfsink.sweep.one import run_folder
 from skfsink.sweep.plan import run_sweep
-from skfsink.sweep.table import draw, read_rows, read_units, write_csv, write_parquet
-from skfsink.sweep.vary import combinations, read_variation
+from skfsink.sweep.sweep_picture import draw
+from skfsink.sweep.table import read_rows, read_units, write_csv, write_parquet
+from skfsink.sweep.vary import combinations, read_variation, with_values
 
 CASE = find_case("single_edge_notch")
 
@@ -53,7 +55,7 @@ def deck(tmp_path: Path) -> Path:
     ("m=5,10", "m", [5, 10]), ("deletion=1e-9,1e-3", "deletion", [1e-9, 1e-3])])
 def test_variations(text: str, name: str, values: list[object]) -> None:
     """Fails if a range, a list or a unit is read otherwise than documented, or whole numbers become others."""
-    found, read = read_variation(text, CASE)
+    found, read = (variation := read_variation(text, Deck(CASE.name, {}))).name, variation.values
     assert (found, read) == (name, pytest.approx(values) if isinstance(values[0], float) else values)
     assert CASE.parameters[name].kind is not int or all(isinstance(value, int) for value in read)
 
@@ -66,7 +68,40 @@ def test_variations(text: str, name: str, values: list[object]) -> None:
 def test_what_cannot_vary(text: str, said: str) -> None:
     """Fails if a mistake passes, or the line does not say what is meant."""
     with pytest.raises(ParameterError) as error:
-        read_variation(text, CASE)
+        read_variation(text, Deck(CASE.name, {}))
+    assert said in str(error.value)
+
+
+LAYERS = Deck("custom", {"mesh": "a.vtu", "material": "hgo", "constants": "angle = 30 degree, axis = [1, 0, 0]",
+                         "regions": ({"name": "core.1", "material": "neo-hookean", "constants": "mu = 0.3 MPa"},)})
+
+
+@pytest.mark.parametrize(("text", "name", "unit", "values", "changed"), [
+    ("angle=0..90:4", "angle", "degree", [0, 30, 60, 90],
+     {"constants": "axis = [1, 0, 0], angle = 90.0 degree"}),
+    ("k2=1..3", "k2", "", [1, 2, 3], {"constants": "angle = 30 degree, axis = [1, 0, 0], k2 = 3.0"}),
+    ("core.1.mu=100 kPa..1 MPa:2", "core.1.mu", "MPa", [0.1, 1],
+     {"regions": ({"name": "core.1", "material": "neo-hookean", "constants": "mu = 1.0 MPa"},)}),
+    ("core.1.phi=0.1,0.2", "core.1.phi", "MPa", [0.1, 0.2],
+     {"regions": ({"name": "core.1", "material": "neo-hookean", "constants": "mu = 0.3 MPa", "phi": 0.2},)})])
+def test_constants_of_laws_vary(text: str, name: str, unit: str, values: list[float], changed: dict[str, object]
+                                ) -> None:
+    """Fails if a constant of the body or of a region is not found, or something besides it changes in the deck."""
+    found = read_variation(text, LAYERS)
+    assert (found.name, found.what.unit, found.values) == (name, unit, pytest.approx(values))
+    before = dict(LAYERS.parameters)
+    assert with_values([found], {name: found.values[-1]}, LAYERS.parameters) == {**before, **changed}
+    assert LAYERS.parameters == before
+
+
+@pytest.mark.parametrize(("text", "said"), [
+    ("mu=1,2", "constants of hgo are c, k1, k2, kappa, angle, axis, normal"), ("axis=1,2", "it is a vector"),
+    ("core.1.k2=1,2", "numbers of regions are phi, m, bulk_modulus, density, viscosity"),
+    ("core.mu=1,2", "no such parameter"), ("grips.x=1,2", "no such parameter"), ("angle=a,b", "angle must be")])
+def test_what_is_no_constant_of_the_deck(text: str, said: str) -> None:
+    """Fails if a constant of another law passes, or the line does not say which there are."""
+    with pytest.raises(ParameterError) as error:
+        read_variation(text, LAYERS)
     assert said in str(error.value)
 
 
@@ -135,6 +170,37 @@ def test_picture_of_an_ensemble(tmp_path: Path) -> None:
     for varied in (["notch", "mesh_seed"], ["mesh_seed"], ["sink"]):
         draw([{**row, "sink": "lumped"} for row in rows], varied, tmp_path / "sweep.png", read_units([]))
         assert (tmp_path / "sweep.png").stat().st_size > 10_000
+
+
+def drawn(rows: list[dict[str, object]], varied: list[str], units: dict[str, str], path: Path,
+          monkeypatch: pytest.MonkeyPatch) -> Figure:
+    """The figure that a picture of a sweep was made from."""
+    kept: list[Figure] = []
+    monkeypatch.setattr("skfsink.sweep.sweep_picture.Figure", lambda *a, **k: kept.append(Figure(*a, **k)) or kept[-1])
+    draw(rows, varied, path, {**read_units([]), **units})
+    return kept[0]
+
+
+def test_axes_have_units_and_panels_have_points(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fails if an axis lacks its unit, a figure that no run has gets a panel, or one below zero is cut off."""
+    rows = [{"angle": angle, "analysis": "quasistatic", "U": 0.1, "tip_speed": None, "tear_angle": -angle}
+            for angle in (0.0, 45.0)]
+    axes = drawn(rows, ["angle"], {"angle": "degree"}, tmp_path / "sweep.png", monkeypatch).axes
+    assert [(ax.get_xlabel(), ax.get_ylabel()) for ax in axes] == [
+        ("angle [degree]", "U [N mm/mm]"), ("angle [degree]", "tear angle [degree]")]
+    assert axes[1].get_ylim()[0] <= -45.0 and axes[0].get_ylim()[0] == 0.0
+
+
+def test_text_is_drawn_in_categories_and_what_else_varies_in_colours(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+                                                                     ) -> None:
+    """Fails if the values of a text parameter are not the ticks, or runs that differ otherwise look alike."""
+    rows = [{"sink": sink, "half": half, "analysis": "dynamic", "U": 0.1} for sink in ("nearest", "lumped")
+            for half in (True, False)]
+    figure = drawn(rows, ["sink", "half"], {}, tmp_path / "sweep.png", monkeypatch)
+    assert [text.get_text() for text in figure.axes[0].get_xticklabels()] == ["lumped", "nearest"]
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["dynamic, half True", "dynamic, half False"]
+    assert [line.get_xdata().tolist() for line in figure.axes[0].lines if len(line.get_xdata())] == [
+        [1.0, 0.0]] * 2
 
 
 def test_parquet_has_the_same_table(tmp_path: Path) -> None:

@@ -20,6 +20,7 @@ from ..results.result import Result
 from ..run.compute import run_case
 from ..run.request import check_options
 from ..scene.case import Case
+from ..scene.fibres import with_fibres
 from ..scene.options import SAMPLE, Options
 from ..scene.scene import Scene
 from ..scene.tables import (
@@ -53,6 +54,7 @@ def custom(
         event_at: Annotated[float, SAMPLE, Unit("s")] = math.inf,
         velocities: Annotated[Sequence[Velocity | Mapping[str, Any]], IN_A_DECK] = (),
         regions: Annotated[Sequence[RegionLaw | Mapping[str, Any]], IN_A_DECK] = (),
+        fibres: Annotated[Sequence[Mapping[str, Any]], IN_A_DECK] = (),
         probes: Annotated[Sequence[Mapping[str, Any]], IN_A_DECK] = (),
         cracks: Annotated[Sequence[Mapping[str, Any]], IN_A_DECK] = (),
         options: Options = Options(),  # noqa: B008
@@ -95,6 +97,9 @@ def custom(
         Of the body, or of a region, as the event begins at `event_at`, for x, y, z.
     regions
         Named sets of elements that are of another material, or of another strength.
+    fibres
+        Directions of the fibres of `hgo`, of the body or of a region: a vector, around or along a line, by two angles,
+        or an array of the mesh file.
     probes
         What is followed through the run, each into a file of its own: quantities at points, along lines and over
         surfaces, forces on boundaries, enclosed volumes, openings.
@@ -117,7 +122,8 @@ def custom(
                  "grips": read_tables("grips", grips), "tractions": read_tables("tractions", tractions),
                  **{name: read_tables(name, tables) for name, tables in (
                      ("pressures", pressures), ("fillings", fillings), ("body_forces", body_forces),
-                     ("regions", regions), ("velocities", velocities), ("probes", probes), ("cracks", cracks))},
+                     ("regions", regions), ("fibres", fibres), ("velocities", velocities), ("probes", probes),
+                     ("cracks", cracks))},
                  "event_at": event_at}
     return run_case(CASE, arguments, options)
 
@@ -139,6 +145,8 @@ def _scene(arguments: dict[str, Any], options: Options) -> Scene:
     material, sink_law = options.stored_energy(), options.sink_law()
     regions = tuple(Region(law.name, sample.elements(law.name), *law.laws(material, sink_law))
                     for law in regions_of(arguments["regions"]))
+    material, regions = with_fibres(arguments.get("fibres", ()), sample, material, regions,
+                                    options.element == "axisymmetric")
     dim = sample.space.dim
     rho0 = by_element(sample.space.n_elements, material.rho0, regions, lambda region: region.material.rho0)
     weights = tuple(partial(BodyForce, rho0=rho0, rate=rate, elements=sample.elements(name) if name else None)

@@ -13,7 +13,7 @@ from .momentum import Momentum
 from .state import State
 from .stress import cauchy_stress, pressure, principal_stresses, von_mises
 
-__all__ = ["QUANTITIES", "USUAL", "Quantity", "quantities_of"]
+__all__ = ["QUANTITIES", "USUAL", "Quantity", "principal_stretches", "quantities_of"]
 
 _AXES = ("x", "y", "z")
 
@@ -62,19 +62,19 @@ def _principal(momentum: Momentum, state: State, places: Places) -> np.ndarray:
     return principal_stresses(_stress(momentum, state, places))[:, ::-1]
 
 
-def _stretches(momentum: Momentum, state: State, places: Places) -> np.ndarray:
-    """Principal stretches of the mean F of the elements, descending; NaN where it is inside out.
+def principal_stretches(momentum: Momentum, u: np.ndarray, elements: np.ndarray) -> np.ndarray:
+    """Principal stretches (m, 3) of the mean F of elements (m,) at `u` (n, dim), descending; NaN if it is inside out.
 
     Of a thin sheet the stretch across it is that which leaves no stress.
     """
     space = momentum.space
-    elements, dim = places.elements, space.dim
+    dim = space.dim
     w = space.w[elements] / space.V[elements, None]
     F = np.zeros((elements.size, 3, 3))
     F[:] = np.eye(3)
-    F[:, :dim, :dim] += np.einsum("eq,eai,eqaJ->eiJ", w, state.u[space.conn[elements]], space.slopes(elements))
+    F[:, :dim, :dim] += np.einsum("eq,eai,eqaJ->eiJ", w, u[space.conn[elements]], space.slopes(elements))
     if space.axisymmetric:
-        F[:, 2, 2] += np.einsum("eq,ea,eqa->e", w, state.u[space.conn[elements], 0], space.around[elements])
+        F[:, 2, 2] += np.einsum("eq,ea,eqa->e", w, u[space.conn[elements], 0], space.around[elements])
     upright = np.linalg.det(F) > 0.0
     F[~upright] = np.eye(3)
     if momentum.plane_stress:
@@ -84,6 +84,10 @@ def _stretches(momentum: Momentum, state: State, places: Places) -> np.ndarray:
     stretches = np.sqrt(np.linalg.eigvalsh(np.swapaxes(F, -1, -2) @ F))[:, ::-1]
     stretches[~upright] = np.nan
     return stretches
+
+
+def _stretches(momentum: Momentum, state: State, places: Places) -> np.ndarray:
+    return principal_stretches(momentum, state.u, places.elements)
 
 
 def _energy(momentum: Momentum, state: State, places: Places) -> np.ndarray:

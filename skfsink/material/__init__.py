@@ -11,7 +11,17 @@ Units: N, mm, MPa, tonne, s. Density is entered in kg/m^3 and held in t/mm^3.
 
 from .base import Material
 from .compiled import GENERAL_LAW, LAW, CompiledLaw
-from .constants import MODULI, constant_names, constants_text, material_of, own_constants, read_constants
+from .constants import (
+    MODULI,
+    constant_names,
+    constant_unit,
+    constants_text,
+    material_of,
+    own_constants,
+    own_names,
+    read_constants,
+    with_constant,
+)
 from .fibres import HolzapfelGasserOgden
 from .general import GeneralMaterial, MooneyRivlin
 from .isotropic import AAA, ArrudaBoyce, Gent, NeoHookean, Yeoh
@@ -20,5 +30,5 @@ from .sink import SinkLaw
 
 __all__ = ["AAA", "GENERAL_LAW", "LAW", "LIMITERS", "MATERIALS", "MODULI", "ArrudaBoyce", "CompiledLaw",
            "GeneralMaterial", "Gent", "HolzapfelGasserOgden", "Limiter", "Material", "MooneyRivlin", "NeoHookean",
-           "SinkLaw", "Yeoh", "constant_names", "constants_text", "limiter_of", "material_from", "material_of",
-           "own_constants", "read_constants"]
+           "SinkLaw", "Yeoh", "constant_names", "constant_unit", "constants_text", "limiter_of", "material_from",
+           "material_of", "own_constants", "own_names", "read_constants", "with_constant"]

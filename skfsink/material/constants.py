@@ -6,6 +6,7 @@ and Poisson's ratio `nu` in place of the bulk modulus: k = 2 G (1 + nu)/(3 (1 - 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
@@ -15,8 +16,8 @@ from ..units import in_unit
 from .base import Material
 from .library import MATERIALS, material_from
 
-__all__ = ["MODULI", "constant_names", "constant_unit", "constants_text", "material_of", "own_constants",
-           "read_constants"]
+__all__ = ["MODULI", "constant_names", "constant_unit", "constants_text", "material_of", "own_constants", "own_names",
+           "read_constants", "with_constant"]
 
 COMMON = tuple(field.name for field in fields(Material))  # these have parameters of their own
 _MPA, _PURE = ("mu", "c", "c1", "c2", "c3", "k1", "E", "G"), ("limit", "segments", "k2", "kappa", "nu")
@@ -35,7 +36,7 @@ def constant_unit(name: str) -> str:
 
 
 def read_constants(law: str, text: str) -> dict[str, Any]:
-    """Constants of a law from text: name = value pairs between commas; the numbers of a vector have blanks between.
+    """Constants of a law from text: name = value pairs between commas; a vector is 1 0 0, or a list [1, 0, 0].
 
     E or G become the constant of the law that they determine, and nu becomes `bulk_modulus`.
 
@@ -54,11 +55,27 @@ def constant_names(law: str, text: str) -> set[str]:
     return set(_pairs(law, text))
 
 
+def own_names(law: str) -> list[str]:
+    """Names of the constants of a law, without those that all laws have."""
+    return [field.name for field in fields(MATERIALS[law]) if field.name not in COMMON]
+
+
+def with_constant(text: str, name: str, value: float) -> str:
+    """A text of constants in which one has another value, in its unit."""
+    others = [part.strip() for part in _parts(text) if part.partition("=")[0].strip() != name]
+    return ", ".join([*others, f"{name} = {value!r} {constant_unit(name)}".strip()])
+
+
+def _parts(text: str) -> list[str]:
+    """What stands between the commas of a text that are not within a list."""
+    return [*filter(str.strip, re.split(r",(?![^\[]*\])", text))]
+
+
 def _pairs(law: str, text: str) -> dict[str, Any]:
-    constants = [field.name for field in fields(MATERIALS[law]) if field.name not in COMMON]
+    constants = own_names(law)
     known = [*constants, *MODULI]
     found: dict[str, Any] = {}
-    for part in filter(str.strip, text.split(",")):
+    for part in _parts(text):
         name, equals, value = (piece.strip() for piece in part.partition("="))
         name = "nu" if name == "ν" else name
         if not equals or name not in known:
@@ -68,7 +85,9 @@ def _pairs(law: str, text: str) -> dict[str, Any]:
         if name in found:
             raise ParameterError(f"constants: {name} is there twice")
         if isinstance(getattr(MATERIALS[law], name, None), tuple):
-            found[name] = tuple(in_unit(name, number, "") for number in value.split())
+            listed = value.startswith("[") and value.endswith("]")
+            numbers = value[1:-1].split(",") if listed else value.split()
+            found[name] = tuple(in_unit(name, number.strip(), "") for number in numbers)
         else:
             found[name] = in_unit(name, value, constant_unit(name), plain=True)
     return found

@@ -100,13 +100,17 @@ class HolzapfelGasserOgden(GeneralMaterial):
         return np.array([self.c, self.k1, self.k2, self.kappa])
 
     def fibres(self, centres: np.ndarray) -> np.ndarray:
-        """The same two directions everywhere, (n, 2, 3); a class of your own may make them depend on the place."""
-        n = np.array(self.normal) / np.linalg.norm(self.normal)
-        axis = np.array(self.axis) - np.dot(self.axis, n) * n
-        axis /= np.linalg.norm(axis)
+        """The same two directions everywhere, (n, 2, 3); :class:`.OrientedFibres` makes them depend on the place."""
+        pair = self.families(np.array([self.axis], float), np.array([self.normal], float))
+        return np.broadcast_to(pair[0], (len(centres), 2, 3))
+
+    def families(self, axes: np.ndarray, normals: np.ndarray) -> np.ndarray:
+        """Directions (n, 2, 3) at plus and minus `angle` to axes (n, 3) in the planes across normals (n, 3)."""
+        n = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+        axis = axes - (axes * n).sum(axis=1, keepdims=True) * n
+        axis = axis / np.linalg.norm(axis, axis=1, keepdims=True)
         cos, sin = np.cos(np.radians(self.angle)), np.sin(np.radians(self.angle))
-        pair = np.stack([cos * axis + sin * np.cross(n, axis), cos * axis - sin * np.cross(n, axis)])
-        return np.broadcast_to(pair, (len(centres), 2, 3))
+        return np.stack([cos * axis + sin * np.cross(n, axis), cos * axis - sin * np.cross(n, axis)], axis=1)
 
     @property
     def shear_modulus(self) -> float:

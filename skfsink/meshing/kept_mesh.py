@@ -43,9 +43,12 @@ def keep_mesh(sample: Sample, path: Path) -> None:
     head = {"format": FORMAT, "name": sample.name, "source": sample.source, "made": sample.made,
             "notes": list(getattr(sample, "notes", ())), "boundaries": list(sample.boundaries),
             "sets": list(sample.cells)}
+    if sample.vectors:
+        head["vectors"] = list(sample.vectors)
     arrays = {"head": np.frombuffer(json.dumps(head).encode(), np.uint8), "points": space.X, "cells": cells}
     for kind, sets in (("boundary", sample.boundaries), ("set", sample.cells)):
         arrays |= {f"{kind}{i}": members for i, members in enumerate(sets.values())}
+    arrays |= {f"vector{i}": values for i, values in enumerate(sample.vectors.values())}
     with replaced(path) as part, open(part, "wb") as file:
         np.savez_compressed(file, **arrays)  # type: ignore[arg-type]
 
@@ -66,6 +69,7 @@ def read_kept(path: Path) -> meshio.Mesh:
             np.column_stack([points, np.zeros((len(points), 3 - points.shape[1]))]), [(kind, cells)],
             point_sets={name: stored[f"boundary{i}"] for i, name in enumerate(head["boundaries"])},
             cell_sets={name: [stored[f"set{i}"]] for i, name in enumerate(head["sets"])},
+            cell_data={name: [stored[f"vector{i}"]] for i, name in enumerate(head.get("vectors", ()))},
             info={key: head[key] for key in ("name", "source", "made", "notes")})
 
 

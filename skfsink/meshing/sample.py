@@ -46,6 +46,8 @@ class Sample:
     notes: what was done to the mesh of a file while it was read, one line each.
     made: whether the mesh was made by gmsh, and is not a file of the user's or a committed one.
     source: path of the file of the user's that it was read from first; "" for other meshes.
+    vectors: arrays of vectors of the file by name, at the elements (ne, 3): those of points are averaged, whatever
+        their sign.
     """
 
     name: str
@@ -55,6 +57,7 @@ class Sample:
     cells: Mapping[str, np.ndarray] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     source: str = ""
+    vectors: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     def revolved(self) -> Sample:
         """The sample as the half plane of a body of revolution (MeshError: it has nodes at x < 0)."""
@@ -269,7 +272,23 @@ def _from_meshio(name: str, data: meshio.Mesh, made: bool = False, source: str =
     except MeshError as error:
         raise MeshError(f"mesh {shown}: {error}") from None
     return Sample(info.get("name") or Path(name).stem, space, _boundaries(data, facet), info.get("made", made),
-                  cells=_elements(data, kind), notes=notes_of(data), source=info.get("source", source))
+                  cells=_elements(data, kind), notes=notes_of(data), source=info.get("source", source),
+                  vectors=_vectors(data, kind, space.conn))
+
+
+def _vectors(data: meshio.Mesh, kind: str, conn: np.ndarray) -> dict[str, np.ndarray]:
+    """Arrays of three components at the elements."""
+    found = {}
+    for name, values in data.point_data.items():
+        if np.shape(values) == (len(data.points), 3):
+            at = np.asarray(values, float)[conn]
+            _, turned = np.linalg.eigh(np.einsum("eai,eaj->eij", at, at))  # of a direction and its opposite the same
+            found[name] = turned[:, :, -1]
+    for name, blocks in data.cell_data.items():
+        own = [np.asarray(values, float) for values, block in zip(blocks, data.cells) if block.type == kind]
+        if own and all(values.ndim == 2 and values.shape[1] == 3 for values in own):
+            found[name] = np.concatenate(own)
+    return found
 
 
 def _elements(data: meshio.Mesh, kind: str) -> dict[str, np.ndarray]:

@@ -17,7 +17,8 @@ __all__ = ["read_mesh", "write_mesh"]
 def write_mesh(path: str | Path, mesh: meshio.Mesh) -> None:
     """Write a mesh to a VTU file.
 
-    A cell set becomes the cell data `boundary:<name>`, 1 on its cells; a point set the point data of that name.
+    A cell set becomes the cell data `boundary:<name>`, 1 on its cells; a point set the point data of that name. Arrays
+    of vectors, of three components, are written as they are.
     """
     flags = {_array_name(name): [np.isin(np.arange(len(block.data)), index).astype(np.int8)
                                  for block, index in zip(mesh.cells, members, strict=True)]
@@ -25,6 +26,8 @@ def write_mesh(path: str | Path, mesh: meshio.Mesh) -> None:
     cells = [(block.type, block.data.astype(np.int32)) for block in mesh.cells]
     nodes = {_array_name(name): np.isin(np.arange(len(mesh.points)), members).astype(np.int8)
              for name, members in mesh.point_sets.items()}
+    flags |= {name: data for name, data in mesh.cell_data.items() if all(np.shape(part)[1:] == (3,) for part in data)}
+    nodes |= {name: data for name, data in mesh.point_data.items() if np.shape(data)[1:] == (3,)}
     meshio.write(path, meshio.Mesh(mesh.points, cells, point_data=nodes, cell_data=flags), file_format="vtu")
 
 

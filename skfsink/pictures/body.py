@@ -13,7 +13,7 @@ from ..fields.fragments import joined
 from ..results.frame import SPENT, Frame
 
 __all__ = ["FACETS", "OBLIQUE", "Body", "View", "bodies", "body", "extent", "fastest",
-           "live_elements", "outer_facets", "speed"]
+           "live_elements", "outer_facets", "round_up", "speed", "turned"]
 
 View = tuple[float, float]          # azimuth and elevation [degrees] from which a body in space is seen
 OBLIQUE = (-75.0, 60.0)
@@ -88,8 +88,7 @@ def body(space: Space, frame: Frame, view: View, colour: np.ndarray | None = Non
         edge = outer_facets(space, np.arange(space.n_elements))[elements] & (gamma[:, facets].min(axis=2) >= CRACKED)
         faces = np.dstack([x, gamma, np.ones_like(gamma), value])[:, [0, 1, 3, 2]]
         return Body(_triangles(faces), x[:, facets][edge], extent(space, elements, x, gamma))
-    (ca, ce), (sa, se) = np.cos(np.radians(view)), np.sin(np.radians(view))
-    x = x @ np.array([[-sa, ca, 0], [-ca * se, -sa * se, ce], [ca * ce, sa * ce, se]]).T  # right, up, to the observer
+    x = x @ turned(view).T
     box, surface = extent(space, elements, x[:, :, :2], gamma), outer_facets(space, elements)
     x, gamma, value = x[:, facets][surface], gamma[:, facets][surface], value[:, facets][surface]
     normal = np.cross(x[:, 2] - x[:, 0], x[:, 3] - x[:, 1])
@@ -97,6 +96,12 @@ def body(space: Space, frame: Frame, view: View, colour: np.ndarray | None = Non
     faces = np.dstack([x[:, :, :2], gamma, np.broadcast_to(light[:, None], gamma.shape), value])
     seen = np.flatnonzero(normal[:, 2] > 0)
     return Body(_triangles(faces[seen[np.argsort(x[seen, :, 2].mean(axis=1))]]), np.zeros((0, 2, 2)), box)
+
+
+def turned(view: View) -> np.ndarray:
+    """Unit vectors to the right, up, and to the observer, (3, 3)."""
+    (ca, ce), (sa, se) = np.cos(np.radians(view)), np.sin(np.radians(view))
+    return np.array([[-sa, ca, 0], [-ca * se, -sa * se, ce], [ca * ce, sa * ce, se]])
 
 
 def speed(frame: Frame) -> np.ndarray:
@@ -110,9 +115,13 @@ def fastest(frames: Sequence[Frame]) -> float:
     """A round speed [m/s] that all but the fastest few of the nodes that hold stay below; frames may lack it."""
     speeds = [speed(frame)[frame.gamma >= CRACKED] for frame in frames if frame.v is not None]
     all_of_them = np.concatenate(speeds)
-    top = float(np.quantile(all_of_them, 0.999)) if all_of_them.size else 0.0
-    unit = 10.0 ** np.floor(np.log10(max(top, 1e-9)))
-    return float(unit * next(step for step in (1, 1.5, 2, 3, 4, 5, 6, 8, 10) if step * unit >= top))
+    return round_up(float(np.quantile(all_of_them, 0.999)) if all_of_them.size else 0.0)
+
+
+def round_up(value: float) -> float:
+    """The next of 1, 1.5, 2, 3, 4, 5, 6, 8 times a power of ten that is not less; 1e-9 at the least."""
+    unit = 10.0 ** np.floor(np.log10(max(value, 1e-9)))
+    return float(unit * next(step for step in (1, 1.5, 2, 3, 4, 5, 6, 8, 10) if step * unit >= value))
 
 
 def _held(values: np.ndarray, holds: np.ndarray) -> np.ndarray:

@@ -2,113 +2,167 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
+from ..fields.frame_fields import asked_fields
 from ..results.fragments import FRAGMENTS, read_fragments
-from ..results.frame import Frame, frame_file, read_frame
-from ..results.history import History
+from ..results.frame import Frame
+from ..results.history import History, Table
+from ..results.loading import way_to_onset
 from ..results.probes import read_probes
 from ..results.result import Result
-from ..results.series import frame_times
+from ..results.stored_series import StoredSeries
 from ..scene.scene import Scene
+from .fibre_picture import fibre_picture
+from .field_picture import field_picture
+from .looks import cells_of
+from .moving import animation, few
 from .piece_picture import piece_picture
-from .plot import (
-    animation,
-    comparison_picture,
-    density_picture,
-    ledger_picture,
-    loading_picture,
-    speed_picture,
-    tip_picture,
-)
+from .plot import comparison_picture, density_picture, ledger_picture, loading_picture, tip_picture
 from .probe_curves import probe_picture
 
-__all__ = ["draw_comparison", "draw_run"]
+__all__ = ["draw_comparison", "draw_run", "draw_what_there_is"]
 
-_WORDS = {"onset": "onset", "branching": "first branches", "arrival": "first arrival", "end": "end"}
+WORDS = {"onset": "onset", "branching": "first branches", "arrival": "first arrival", "end": "end"}
+LATEST = "last frame"
 
 
 def draw_run(scene: Scene, folder: Path, series: str, moments: Mapping[str, int]) -> None:
-    """`density.png`, `speed.png` (dynamic), `energies.png`, `tip.png` and `animation.gif` of a finished run;
-    `probes.png` of one with probes, and `fragments.png` of a body that has come apart.
+    """`density`, `speed` (dynamic), `loading`, `energies`, `tip` and `animation.gif` of a run; `probes` of one with
+    probes, `fibres` of one with fibres, `fragments` of a body that has come apart, and the fields that its scene asks
+    for.
 
-    They are drawn from the files in `folder`. `series` names the one to draw, "run", or "loading" of a body that did
-    not fail; `moments` has the numbers of the frames at key moments.
+    They are drawn from the files in `folder`, in the format that the scene says. `series` names the one to draw, "run",
+    or "loading" of a body that did not fail; `moments` has the numbers of the frames at key moments.
     """
-    space = scene.sample.space
     quasistatic = scene.controls.analysis == "quasistatic"
     kind = "quasi-static" if quasistatic else f"dynamic, {scene.controls.integrator}"
-    title = f"{scene.title}, mesh {scene.sample.name}, {kind}"
-    history = History.load(folder / "history.csv")
-    _draw_probes(folder, title, quasistatic)
+    run = _Files(scene, folder, f"{scene.title}, mesh {scene.sample.name}, {kind}", series, moments)
+    _draw_probes(run)
+    if (fibres := scene.fibres) is not None:
+        fibre_picture(scene.space, fibres, run.path("fibres"), f"{scene.title}, mesh {scene.sample.name}", scene.view)
     if series == "loading":
-        _draw_loading(scene, folder)
+        run.title = f"{scene.title}, mesh {scene.sample.name}: " + (
+            "not finished" if LATEST in moments else "nothing failed")
+        _draw_loading(run)
         return
-    labels = {number: _WORDS.get(label, label) for label, number in moments.items()}
-    frames = [_frame(folder, number, time, labels.get(number, ""), scene)
-              for number, time in enumerate(frame_times(folder / "series" / "run.pvd"))]
-    keys = sorted(set(moments.values()))
-    if len(keys) < 4:  # too few things happened: add the middle of the event
-        keys = sorted({*keys, len(frames) // 2})
-    density_picture(space, [frames[k] for k in keys], folder / "density.png", title, scene.view)
-    if not quasistatic:
-        speed_picture(space, [frames[k] for k in keys], folder / "speed.png", title, scene.view)
-    ledger_picture(history, folder / "energies.png", title)
-    _draw_pieces(scene, folder, frames[-1], title)
+    history = History.load(folder / "history.csv")
+    keys = run.keys()
+    frames = run.frames(keys, [cell for name in run.asked for cell in cells_of(name)])
+    density_picture(scene.space, frames, run.path("density"), run.title, scene.view)
+    for name in (*(() if quasistatic else ("speed",)), *run.asked):
+        field_picture(scene.space, frames, name, run.path(name), run.title, scene.view)
+    loading_picture(way_to_onset(folder), run.path("loading"), run.title, _event(history))
+    ledger_picture(history, run.path("energies"), run.title)
+    _draw_pieces(run, frames[-1])
     part = max(scene.parts, key=lambda part: int(frames[-1].deleted[part.elements].sum()))  # where the crack has run
+    title = run.title
     if len(scene.parts) > 1 and not quasistatic:
         title += f"\n$c_s$, $c_R$ {'in region ' + part.name if part.name else 'outside of the regions'}"
-    tip_picture(history, folder / "tip.png", title, np.nan if quasistatic else part.material.shear_wave_speed,
+    tip_picture(history, run.path("tip"), title, np.nan if quasistatic else part.material.shear_wave_speed,
                 np.nan if quasistatic else part.material.rayleigh_wave_speed)
-    animation(space, frames, folder / "animation.gif", view=scene.view)
+    animation(scene.space, run.frames(few(len(run.stored))), folder / "animation.gif", view=scene.view)
 
 
-def _draw_loading(scene: Scene, folder: Path) -> None:
-    """`density.png`, `loading.png` and `animation.gif` of a run that did not fail."""
-    space, title = scene.sample.space, f"{scene.title}, mesh {scene.sample.name}: nothing failed"
-    frames = [read_frame(folder / "series" / frame_file("loading", i), np.nan, f"load time {time:.4g} s", space.dim)
-              for i, time in enumerate(frame_times(folder / "series" / "loading.pvd"))]
-    keys = sorted({len(frames) // 2, len(frames) - 1})
-    density_picture(space, [frames[k] for k in keys], folder / "density.png", title, scene.view)
-    loading_picture(History.load(folder / "history.csv"), folder / "loading.png", title)
-    animation(space, frames, folder / "animation.gif", view=scene.view)
+def draw_what_there_is(scene: Scene, folder: Path, moments: Mapping[str, int]) -> bool:
+    """The same of a run that has stopped on its way, up to its last frame; whether there was anything to draw."""
+    for series in ("run", "loading"):
+        stored = StoredSeries.of(folder / "series", series)
+        if len(stored) and (series == "loading" or len(_event(History.load(folder / "history.csv"))["step"]) > 1):
+            known = {word: number for word, number in moments.items() if series == "run" and number < len(stored)}
+            draw_run(scene, folder, series, {**known, LATEST: len(stored) - 1})
+            return True
+    return False
 
 
-def _draw_probes(folder: Path, title: str, quasistatic: bool) -> None:
-    """`probes.png`, of a run that has probes."""
-    if probes := read_probes(folder):
-        probe_picture(probes, folder / "probes.png", title, quasistatic)
+@dataclass
+class _Files:
+    """The files of a run, as they are drawn: `read` keeps the frames that were read."""
+
+    scene: Scene
+    folder: Path
+    title: str
+    series: str
+    moments: Mapping[str, int]
+    read: dict[int, Frame] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.stored = StoredSeries.of(self.folder / "series", self.series)
+        self.asked = asked_fields(self.scene.controls.fields)
+
+    def path(self, name: str) -> Path:
+        """Of the picture of that name."""
+        return self.folder / f"{name}.{self.scene.controls.pictures}"
+
+    def keys(self) -> list[int]:
+        """Numbers of the frames at key moments, and of others where too few things have happened."""
+        found = set(self.moments.values())
+        if len(found) < 4:
+            found.add(len(self.stored) // 2)
+        return sorted(found)
+
+    def frames(self, numbers: Sequence[int], cells: Sequence[str] = ()) -> list[Frame]:
+        """Some frames, with their labels; each is read once."""
+        labels = {number: WORDS.get(moment, moment) for moment, number in self.moments.items()}
+        quasistatic = self.scene.controls.analysis == "quasistatic"
+        for number in numbers:
+            if number in self.read:
+                continue
+            time = self.stored.times[number]
+            word = labels.get(number, "")
+            if self.series == "loading":
+                word, time = f"load time {time:.4g} s", np.nan
+            elif quasistatic:
+                word, time = ", ".join(filter(None, [word, f"pass {time:.0f}"])), np.nan
+            self.read[number] = self.stored.frame(number, time, word, self.scene.space.dim, cells)
+        return [self.read[number] for number in numbers]
 
 
-def _draw_pieces(scene: Scene, folder: Path, frame: Frame, title: str) -> None:
-    """`fragments.png`, of a body that has come apart."""
-    rows = read_fragments(folder / FRAGMENTS) if (folder / FRAGMENTS).exists() else {}
+def _event(history: Table) -> Table:
+    rows = history["phase"] == "event"
+    return Table({name: values[rows] for name, values in history.items()}, history.dim, history.without)
+
+
+def _draw_loading(run: _Files) -> None:
+    """`density`, `loading`, fields and `animation.gif` of a run that did not fail."""
+    scene = run.scene
+    frames = run.frames(sorted({len(run.stored) // 2, len(run.stored) - 1}),
+                        [cell for name in run.asked for cell in cells_of(name)])
+    density_picture(scene.space, frames, run.path("density"), run.title, scene.view)
+    for name in run.asked:
+        field_picture(scene.space, frames, name, run.path(name), run.title, scene.view)
+    loading_picture(way_to_onset(run.folder), run.path("loading"), run.title)
+    animation(scene.space, run.frames(few(len(run.stored))), run.folder / "animation.gif", view=scene.view)
+
+
+def _draw_probes(run: _Files) -> None:
+    """`probes`, of a run that has probes."""
+    if probes := read_probes(run.folder):
+        probe_picture(probes, run.path("probes"), run.title, run.scene.controls.analysis == "quasistatic")
+
+
+def _draw_pieces(run: _Files, frame: Frame) -> None:
+    """`fragments`, of a body that has come apart."""
+    rows = read_fragments(run.folder / FRAGMENTS) if (run.folder / FRAGMENTS).exists() else {}
     if not rows or len(first := np.flatnonzero(rows["piece"] == 1)) == 0 or rows["piece"][-1] < 2:
         return
-    last = {name: values[first[-1]:] for name, values in rows.items()}
+    scene, last = run.scene, {name: values[first[-1]:] for name, values in rows.items()}
     density = np.empty((scene.space.n_elements, 1))
     for part in scene.parts:
         density[part.elements] = part.material.rho0
-    piece_picture(scene.space, frame, last, density, folder / "fragments.png", title, scene.view)
-
-
-def _frame(folder: Path, number: int, time: float, word: str, scene: Scene) -> Frame:
-    quasistatic = scene.controls.analysis == "quasistatic"
-    if quasistatic:
-        word = ", ".join(filter(None, [word, f"pass {time:.0f}"]))
-    return read_frame(folder / "series" / frame_file("run", number), np.nan if quasistatic else time, word,
-                      scene.sample.space.dim)
+    piece_picture(scene.space, frame, last, density, run.path("fragments"), run.title, scene.view)
 
 
 def draw_comparison(dynamic: Result, quasistatic: Result, folder: Path) -> None:
-    """`comparison.png`: the dynamic crack beside the quasi-static one, at the end of each."""
-    frames = []
-    space = dynamic.scene.sample.space
+    """`comparison`: the dynamic crack beside the quasi-static one, at the end of each."""
+    frames, scene = [], dynamic.scene
     for part in (dynamic, quasistatic):
         number = part.summary["moments"].get("arrival", part.summary["moments"]["end"])
-        frames.append(read_frame(part.folder / "series" / frame_file("run", number), np.nan, "", space.dim))
-    comparison_picture(space, frames[0], frames[1], dynamic.history, quasistatic.history, folder / "comparison.png",
-                       title=f"{dynamic.scene.title}, mesh {dynamic.scene.sample.name}", view=dynamic.scene.view)
+        frames.append(StoredSeries.of(part.folder / "series", "run").frame(number, np.nan, "", scene.space.dim))
+    comparison_picture(scene.space, frames[0], frames[1], dynamic.history, quasistatic.history,
+                       folder / f"comparison.{scene.controls.pictures}",
+                       title=f"{scene.title}, mesh {scene.sample.name}", view=scene.view)

@@ -6,7 +6,6 @@ path decides on the format; in vector formats the density is an image. Sizes are
 
 from __future__ import annotations
 
-import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -20,18 +19,17 @@ from matplotlib.collections import LineCollection, TriMesh
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
 from matplotlib.tri import Triangulation
-from PIL import Image
 
 from ..fem.space import Space
 from ..fields.energy import OPTIONAL_TERMS
 from ..results.frame import Frame
 from ..results.history import Table, history_units
-from ..system.files import replaced, write_atomic
+from ..system.files import replaced
 from . import body as deformed
 from .body import OBLIQUE, Body, View
 
-__all__ = ["GAMMA_MAP", "STYLE", "Frame", "animation", "comparison_picture", "density_bar", "density_picture",
-           "draw_body", "ledger_picture", "loading_picture", "save", "save_gif", "speed_picture", "tip_picture"]
+__all__ = ["GAMMA_MAP", "STYLE", "Frame", "comparison_picture", "density_bar", "density_picture", "draw_bodies",
+           "draw_body", "ledger_picture", "loading_picture", "page", "panels", "save", "tip_picture"]
 
 History = Mapping[str, np.ndarray]  # columns, as `output.History.load` gives them
 
@@ -47,11 +45,11 @@ BANDS = {"sink_stored": ("$D$, from stored energy", "#a63d40"), "sink_kinetic": 
          "numerical": ("numerical", "#9b9b9b")}
 RED, BLUE, SAND = (BANDS[name][1] for name in ("sink_stored", "elastic", "released"))
 STYLE: dict[Any, Any] = {
-    "font.family": "DejaVu Sans", "font.size": 8, "axes.titlesize": 8, "axes.labelsize": 8, "axes.linewidth": 0.6,
-    "figure.titlesize": 9, "legend.fontsize": 7, "legend.frameon": False, "xtick.labelsize": 7, "ytick.labelsize": 7,
-    "xtick.major.width": 0.6, "ytick.major.width": 0.6, "lines.linewidth": 1.2}
+    "font.family": "DejaVu Sans", "svg.hashsalt": "skfsink", "font.size": 8, "axes.titlesize": 8, "axes.labelsize": 8,
+    "axes.linewidth": 0.6, "figure.titlesize": 9, "legend.fontsize": 7, "legend.frameon": False,
+    "xtick.labelsize": 7, "ytick.labelsize": 7, "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6, "lines.linewidth": 1.2}
 WIDTH, TALLEST, DPI = 7.2, 9.0, 300  # size of a picture [in], dots per inch
-GIF_FRAMES = 40     # at the most, less than 3 MB
 GAMMA_SCALE = ScalarMappable(Normalize(0, 1), GAMMA_MAP)
 SPEED_MAP = matplotlib.colormaps["viridis"]
 
@@ -70,13 +68,13 @@ def draw_body(ax: Axes, body: Body, title: str, scale: ScalarMappable = GAMMA_SC
     ax.set_title(title)
 
 
-def _panels(axes: Sequence[Axes], bodies: Sequence[Body], titles: Sequence[str], box: np.ndarray) -> None:
+def panels(axes: Sequence[Axes], bodies: Sequence[Body], titles: Sequence[str], box: np.ndarray) -> None:
     """Bodies at one scale, with titles and a colour bar of gamma."""
-    _bodies(axes, bodies, titles, box)
+    draw_bodies(axes, bodies, titles, box)
     density_bar(axes)
 
 
-def _bodies(axes: Sequence[Axes], bodies: Sequence[Body], titles: Sequence[str], box: np.ndarray,
+def draw_bodies(axes: Sequence[Axes], bodies: Sequence[Body], titles: Sequence[str], box: np.ndarray,
             scale: ScalarMappable = GAMMA_SCALE) -> None:
     for ax, body, title in zip(axes, bodies, titles):
         draw_body(ax, body, title, scale)
@@ -99,29 +97,14 @@ def density_picture(space: Space, frames: Sequence[Frame], path: str | Path, tit
                     view: View = OBLIQUE) -> None:
     """Relative density on the deformed body, a panel for each frame; cracks (gamma < 0.1) stand open."""
     bodies, box, ratio = deformed.bodies(space, frames, view)
-    figure, axes = _page(len(frames), ratio)
-    _panels(axes, bodies, [frame.title for frame in frames], box)
+    figure, axes = page(len(frames), ratio)
+    panels(axes, bodies, [frame.title for frame in frames], box)
     for ax in axes:
         ax.label_outer()
     save(figure, path, title)
 
 
-@matplotlib.rc_context(STYLE)
-def speed_picture(space: Space, frames: Sequence[Frame], path: str | Path, title: str = "",
-                  view: View = OBLIQUE) -> None:
-    """Speed of the material on the deformed body, a panel for each frame; they must have velocities."""
-    bodies, box, ratio = deformed.bodies(space, frames, view, [deformed.speed(frame) for frame in frames])
-    scale = ScalarMappable(Normalize(0, deformed.fastest(frames)), SPEED_MAP)
-    figure, axes = _page(len(frames), ratio)
-    _bodies(axes, bodies, [frame.title for frame in frames], box, scale)
-    bar = figure.colorbar(scale, ax=axes, aspect=25, pad=0.02, shrink=0.8, extend="max")
-    bar.set_label("speed of the material (m/s)")
-    for ax in axes:
-        ax.label_outer()
-    save(figure, path, title)
-
-
-def _page(n: int, ratio: float) -> tuple[Figure, list[Axes]]:
+def page(n: int, ratio: float) -> tuple[Figure, list[Axes]]:
     """A page with `n` panels of this height over width."""
     panel = {columns: min((WIDTH - 1.3) / columns - 0.1, ((TALLEST - 0.6) * columns / n - 0.3) / ratio)  # width [in]
              for columns in range(1, n + 1) if n % columns == 0}
@@ -129,40 +112,6 @@ def _page(n: int, ratio: float) -> tuple[Figure, list[Axes]]:
     figure = Figure((WIDTH, n // columns * (panel[columns] * ratio + 0.3) + 0.6), layout="compressed")
     axes: list[Axes] = figure.subplots(n // columns, columns, squeeze=False).ravel().tolist()
     return figure, axes
-
-
-@matplotlib.rc_context(STYLE)
-def animation(space: Space, frames: Sequence[Frame], path: str | Path, seconds: float = 7.0,
-              view: View = OBLIQUE) -> None:
-    """Relative density on the deformed body as an endless GIF of about `seconds`, of `GIF_FRAMES` at the most."""
-    frames = [frames[i] for i in np.unique(np.linspace(0, len(frames) - 1, min(len(frames), GIF_FRAMES)).astype(int))]
-    last, box, ratio = deformed.bodies(space, frames[::-8], view)
-    scale = 3.6 / max(1, ratio)
-    figure = Figure((scale + 1.3, scale * ratio + 0.75), dpi=120, layout="compressed")
-    canvas, ax = FigureCanvasAgg(figure), figure.subplots()
-    _panels([ax], last[:1], [frames[-1].title], box)
-    canvas.draw()
-    figure.set_layout_engine("none")  # keep this layout for all frames
-    pictures = []
-    for frame in frames:
-        for artist in list(ax.collections):
-            artist.remove()
-        draw_body(ax, deformed.body(space, frame, view), frame.title)
-        canvas.draw()
-        pictures.append(Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB"))
-    save_gif(pictures, path, seconds)
-
-
-def save_gif(pictures: Sequence[Image.Image], path: str | Path, seconds: float, colours: int = 128) -> None:
-    """Pictures as an endless GIF of about `seconds` and so many colours; the last one stays for a while."""
-    some = np.concatenate([*map(np.asarray, pictures[::max(1, len(pictures) // 4)])])
-    palette = Image.fromarray(some).quantize(colours)
-    images = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
-    duration = [max(20, int(1000 * seconds / (len(pictures) + 5)))] * len(pictures)
-    duration[-1] *= 6  # the end stays for a while
-    file = io.BytesIO()
-    images[0].save(file, "GIF", save_all=True, append_images=images[1:], duration=duration, loop=0)
-    write_atomic(path, file.getvalue())
 
 
 @matplotlib.rc_context(STYLE)
@@ -174,7 +123,7 @@ def comparison_picture(space: Space, dynamic_frame: Frame, quasistatic_frame: Fr
     figure = Figure((WIDTH, tall + 2.9), layout="constrained")
     axes = figure.subplot_mosaic([["a", "b"], ["c", "c"]], height_ratios=[tall, 1.9])
     names = [f"(a) dynamic {dynamic_frame.title}", f"(b) quasi-static {quasistatic_frame.title}"]
-    _panels([axes["a"], axes["b"]], bodies, names, box)
+    panels([axes["a"], axes["b"]], bodies, names, box)
     axes["b"].set_ylabel("")
     bars = axes["c"]
     groups = {"U_paper": "$U$ of\nthe paper", "sink_stored": "$D$, from\nstored energy",
@@ -212,17 +161,31 @@ def _dimension(history: History) -> int:
 
 
 @matplotlib.rc_context(STYLE)
-def loading_picture(history: History, path: str | Path, title: str = "") -> None:
-    """Load over displacement while the body is loaded, and the least relative density on the way."""
+def loading_picture(history: History, path: str | Path, title: str = "", event: History | None = None) -> None:
+    """Load over displacement while the body is loaded, from the unloaded body on, and the least relative density.
+
+    `event` has the rows of the event that the loading has ended in: the onset is marked then, and the way of the load
+    from there on is drawn as well.
+    """
     rows = history["phase"] == "loading"
     x, load, gamma = (history[name][rows] for name in ("grip_displacement_mm", "reaction_N_per_mm", "gamma_min"))
     figure = Figure((WIDTH / 2 + 0.6, 4.2), layout="constrained")
     ax, low = figure.subplots(2, 1, sharex=True, height_ratios=[3, 1])
     unit = history_units(_dimension(history))["reaction_N_per_mm"]
-    ax.plot(np.append(0, x), np.append(0, load), "k.-", markersize=3)
+    if event is not None:
+        ax.plot(event["grip_displacement_mm"], event["reaction_N_per_mm"], color="0.55", linewidth=0.8, label="event")
+    ax.plot(np.append(0, x), np.append(0, load), "k.-", markersize=3, label="loading")
+    if event is not None and len(x):
+        ax.plot(x[-1], load[-1], "o", color=RED, markersize=5, zorder=3,
+                label=f"onset: {load[-1]:.3g} {unit} at {x[-1]:.3g} mm")
+        ax.legend(*(entry[::-1] for entry in ax.get_legend_handles_labels()), loc="best")
     ax.set_ylabel(f"load ({unit})")
     low.plot(np.append(0, x), np.append(1, gamma), color=RED)
-    low.set(xlabel="displacement of the grips (mm)", ylabel=r"least $\gamma$", ylim=(0, 1.05))
+    least = float(gamma.min()) if len(gamma) else 1.0
+    low.set(xlabel="displacement (mm)", ylabel=r"least $\gamma$", ylim=(min(0.95, 1.1 * least - 0.1), None))
+    for limit, data in ((ax.set_xlim, ax.dataLim.intervalx), (ax.set_ylim, ax.dataLim.intervaly)):
+        if data[0] >= 0.0:  # nothing moved back: the corner is the unloaded body
+            limit(0, None)
     figure.align_ylabels()
     save(figure, path, title)
 
@@ -260,7 +223,8 @@ def tip_picture(history: History, path: str | Path, title: str, shear_wave_speed
     """Where the leading tip is, how fast beside the wave speeds [m/s] (if finite), and the number of branches."""
     event, time, label, _ = _event(history)
     figure = Figure((WIDTH / 2 + 0.6, 4.2), layout="constrained")
-    ax, low = figure.subplots(2, 1, sharex=True, subplot_kw={"xmargin": 0})
+    timed = bool(np.isfinite(shear_wave_speed))
+    ax, low = figure.subplots(2, 1, sharex=True, height_ratios=[1, 1] if timed else [3, 1], subplot_kw={"xmargin": 0})
     ax.plot(time, event["crack_length_mm"], "k", label="crack length")
     for name, line in (("x", "-"), ("y", "--"), ("z", ":")):
         if np.isfinite(event[f"tip_{name}_mm"]).any():
@@ -269,7 +233,7 @@ def tip_picture(history: History, path: str | Path, title: str, shear_wave_speed
     ax.legend()
     low.set_xlabel(label)
     count = low
-    if np.isfinite(shear_wave_speed):
+    if timed:
         speed = event["tip_speed_m_per_s"]
         low.plot(time, speed, color=RED)
         low.axhline(shear_wave_speed, color="0.3", linewidth=0.8, label="$c_s$")
@@ -279,15 +243,38 @@ def tip_picture(history: History, path: str | Path, title: str, shear_wave_speed
         low.legend(loc="upper right", ncols=2)
         count = low.twinx()
     count.step(time, event["branches"], where="post", color=BLUE)
-    count.set(xmargin=0, ylim=(0, 3 * max(2, event["branches"].max())))  # in the lower third, clear of the speed
+    most = max(2 if timed else 1, event["branches"].max())
+    count.set(xmargin=0, ylim=(0, 3 * most if timed else most + 0.5))  # in the lower third, clear of the speed
     count.set_ylabel("branches", color=BLUE)
     count.locator_params(axis="y", nbins=6, integer=True)
     save(figure, path, title)
 
 
 def save(figure: Figure, path: str | Path, title: str) -> None:
-    """Write a figure with its title, in the format that the name of the file says."""
+    """Write a figure with its title, in the format that the name of the file says.
+
+    A title that is wider than the figure is broken at a comma, as near to its middle as can be.
+    """
     figure.suptitle(title)
+    if title and figure.get_suptitle():
+        _fit(figure)
     kind = Path(path).suffix.lstrip(".") or "png"
+    undated = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}
     with replaced(path) as part:
-        figure.savefig(part, format=kind, dpi=DPI, metadata={"CreationDate": None} if kind == "pdf" else None)
+        figure.savefig(part, format=kind, dpi=DPI, metadata=undated.get(kind))
+
+
+def _fit(figure: Figure) -> None:
+    """Break a title that is too wide, and make it smaller if that does not do."""
+    title: Any = figure._suptitle  # type: ignore[attr-defined]
+    room, renderer = 0.98 * figure.bbox.width, FigureCanvasAgg(figure).get_renderer()
+
+    def width() -> float:
+        return float(title.get_window_extent(renderer).width)
+
+    text = title.get_text()
+    if width() > room and "\n" not in text and (commas := [i for i, letter in enumerate(text) if letter == ","]):
+        at = min(commas, key=lambda i: abs(i - len(text) / 2))
+        title.set_text(f"{text[:at + 1]}\n{text[at + 2:]}")
+    if (wide := width()) > room:
+        title.set_fontsize(title.get_fontsize() * room / wide)

@@ -12,6 +12,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from matplotlib.colors import Colormap
 
 from ..errors import MissingExtra
 from ..fem.space import Space
@@ -22,8 +23,6 @@ from . import body as deformed
 from .plot import GAMMA_MAP, SPEED_MAP
 
 __all__ = ["Camera", "bounds", "render", "surface"]
-
-#: Colours of the speed of the material; their lightness rises throughout.
 
 LEAST_PIECE = 1e-3      # of the faces; smaller fragments are left out
 FINER = 3               # pixels rendered for one of the picture, along each side
@@ -66,12 +65,12 @@ def bounds(space: Space, frames: Sequence[Frame], camera: Camera, margin: float 
     return box + margin * np.ptp(box, axis=0).max() * np.array([[-1.0], [1.0]])
 
 
-def surface(space: Space, frame: Frame) -> Any:
+def surface(space: Space, frame: Frame, values: np.ndarray | None = None) -> Any:
     """The surface of what is left of the body, as a pyvista `PolyData` on the deformed shape.
 
     It ends where gamma falls below 0.1, and is closed there by the lips of the crack. Its point data are `gamma` and,
-    if the frame has velocities, `speed` [mm/s]. It is cut in the undeformed body, where a spent node carries neither
-    displacement nor velocity: the lips move with the nodes that are not spent.
+    if the frame has velocities, `speed` [mm/s]; with nodal `values` (n,) also `value`. It is cut in the undeformed
+    body, where a spent node carries neither displacement nor velocity: the lips move with the nodes that are not spent.
 
     Raises
     ------
@@ -85,6 +84,8 @@ def surface(space: Space, frame: Frame) -> Any:
     grid.point_data.update({"gamma": frame.gamma, "held": held, "u": held[:, None] * frame.u})
     if frame.v is not None:
         grid.point_data["v"] = held[:, None] * frame.v
+    if values is not None:
+        grid.point_data["value"] = held * values
     gamma = frame.gamma[space.conn[elements]]
     rim = np.flatnonzero((gamma.min(axis=1) < CRACKED) & (gamma.max(axis=1) >= CRACKED))
     skin = grid.extract_surface(algorithm="dataset_surface").clip_scalar(scalars="gamma", value=CRACKED, invert=False)
@@ -99,6 +100,8 @@ def surface(space: Space, frame: Frame) -> Any:
     whole.points = np.asarray(whole.points) + np.asarray(whole["u"]) / weight
     if frame.v is not None:
         whole["speed"] = np.linalg.norm(np.asarray(whole["v"]) / weight, axis=1)
+    if values is not None:
+        whole["value"] = np.asarray(whole["value"]) / weight[:, 0]
     return _without_fragments(whole)
 
 
@@ -110,15 +113,17 @@ def _without_fragments(body: Any) -> Any:
 
 
 def render(space: Space, frame: Frame, camera: Camera, box: np.ndarray, width: int, *,
-           field: str = "gamma", largest: float = 1.0) -> np.ndarray:
+           field: str = "gamma", largest: float = 1.0, least: float = 0.0, values: np.ndarray | None = None,
+           colours: Colormap | None = None) -> np.ndarray:
     """The body in colours of a field.
 
     Parameters
     ----------
     box: what the picture shows, places as of `Camera.project` [mm], (2, 2).
     width: of the picture in pixels; its height follows from `box`.
-    field: "gamma", or "speed" in a frame with velocities.
-    largest: value of the last colour, [mm/s] for the speed.
+    field: "gamma", or "speed" in a frame with velocities; "value" of the nodal `values` (n,).
+    largest, least: values of the last and the first colour, [mm/s] for the speed.
+    colours: other ones than those of gamma and of the speed.
 
     Returns
     -------
@@ -133,22 +138,22 @@ def render(space: Space, frame: Frame, camera: Camera, box: np.ndarray, width: i
     size = box[1] - box[0]
     height = max(1, round(width * float(size[1] / size[0])))
     with pv.vtk_verbosity("off"):  # which tells that there is no display
-        picture = _shot(pv, surface(space, frame), camera, box, (FINER * width, FINER * height), field=field,
-                        largest=largest)
+        picture = _shot(pv, surface(space, frame, values), camera, box, (FINER * width, FINER * height), field=field,
+                        limits=(least, largest), colours=colours or (GAMMA_MAP if field == "gamma" else SPEED_MAP))
     coarse = np.asarray(picture, float).reshape(height, FINER, width, FINER, -1).mean(axis=(1, 3))
     return np.rint(coarse[..., :3]).astype(np.uint8)
 
 
 def _shot(pv: Any, body: Any, camera: Camera, box: np.ndarray, pixels: tuple[int, int], *,
-          field: str, largest: float) -> np.ndarray:
+          field: str, limits: tuple[float, float], colours: Colormap) -> np.ndarray:
     right, up, back = camera.axes
     centre, far = box.mean(axis=0) @ camera.axes[:2], 100.0 * float(np.ptp(box, axis=0).max())
     plotter = pv.Plotter(off_screen=True, window_size=pixels, lighting="none")
     try:
         plotter.set_background("white")
-        plotter.add_mesh(body, scalars=field, cmap=GAMMA_MAP if field == "gamma" else SPEED_MAP, clim=(0.0, largest),
-                         n_colors=256, show_scalar_bar=False, smooth_shading=True, split_sharp_edges=True,
-                         feature_angle=40.0, ambient=_AMBIENT, diffuse=1.0, specular=0.0)
+        plotter.add_mesh(body, scalars=field, cmap=colours, clim=limits, n_colors=256, show_scalar_bar=False,
+                         smooth_shading=True, split_sharp_edges=True, feature_angle=40.0, ambient=_AMBIENT,
+                         diffuse=1.0, specular=0.0)
         for x, y, z, strength in _LIGHTS:
             light = pv.Light(position=centre + far * (x * right + y * up + z * back), focal_point=centre,
                              intensity=strength, light_type="scene light")

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 
 from ..pictures.plot import STYLE
 from ..results.loader import Run
+from ..results.loading import way_to_onset
 
 __all__ = ["COLOURS", "Chart", "energy_chart", "loading_chart", "speed_chart"]
 
@@ -105,17 +106,20 @@ def energy_chart(runs: Sequence[Run], labels: Sequence[str]) -> Chart | None:
 
 @matplotlib.rc_context(_SVG)
 def loading_chart(runs: Sequence[Run], labels: Sequence[str]) -> Chart | None:
-    """Load over the displacement of the grips up to the onset; None if no run was loaded in more than one step."""
+    """Load over the displacement of the grips up to the onset, a dot; None if no run was loaded in more than one step.
+    """
     figure = Figure((_SIZE[0], 2.6), layout="constrained")
     ax = figure.subplots()
     sentences = []
     for run, label, look in _lines(runs, labels, "reaction_N_per_mm"):
-        rows = run.history["phase"] == "loading"
-        if rows.sum() < 2:
+        rows = way_to_onset(run.folder)
+        if len(rows["step"]) < 2:
             continue
-        x, y = (run.history[name][rows] for name in ("grip_displacement_mm", "reaction_N_per_mm"))
+        x, y = (rows[name] for name in ("grip_displacement_mm", "reaction_N_per_mm"))
         unit = run.history.units["reaction_N_per_mm"]
         ax.plot(np.append(0, x), np.append(0, y), marker=".", **look)
+        if run.event["step"].size:
+            ax.plot(x[-1:], y[-1:], "o", markersize=5, color=look["color"], zorder=3)  # the onset
         sentences.append(f"{label}: {y[-1]:.3g} {unit} at {x[-1]:.3g} mm")
     if not sentences:
         return None

@@ -23,6 +23,15 @@ from .tables import EMPTY, Row, Table, cost_table, energy_tables, key_table, ver
 __all__ = ["environment", "report_page", "write_report"]
 
 _KINDS = {".png": "image/png", ".gif": "image/gif", ".svg": "image/svg+xml"}
+#: Pictures of a run that are on the page in this order beside those of the density and the speed.
+FIELDS = (
+    ("von_mises.png", "Von Mises stress", "Von Mises stress on the deformed body at the key moments"),
+    ("principal_stress.png", "Greatest principal stress", "Greatest principal stress on the deformed body"),
+    ("pressure.png", "Pressure", "Pressure on the deformed body at the key moments"),
+    ("stretch.png", "Greatest principal stretch", "Greatest principal stretch on the deformed body"),
+    ("W.png", "Energy density", "Stored energy density of the undamaged material on the deformed body"),
+    ("fibres.png", "Fibres", "Directions of the fibres on the undeformed body"),
+)
 #: Pictures of a run: file, title, what it shows.
 PICTURES = (
     ("density.png", "Relative density", "Relative density γ on the deformed body at the key moments"),
@@ -33,6 +42,7 @@ PICTURES = (
     ("release.png", "Energy release rate", "Energy release rate and speed of each tip over time"),
     ("fragments.png", "Pieces", "The deformed body at the end, coloured by the pieces into which it has come apart"),
     ("probes.png", "Probes", "What the probes followed: in the loading over displacement, in the event over time"),
+    *FIELDS,
     ("animation.gif", "Animation", "Relative density γ on the deformed body, moving"),
 )
 _CARDS = ("displacement of the grips at the onset", "load at the onset", "first arrival of the crack at an edge",
@@ -112,6 +122,7 @@ def report_page(asked: Sequence[Run]) -> str:
         charts={title: Picture(_data(chart.svg, ".svg"), title, chart.alt) for title, chart in drawn},
         comparisons=[picture for picture in comparisons if picture], energies=energy_tables(runs, labels),
         parts=parts, titles={title for part in parts for title in part.pictures},
+        fields=[title for _, title, _ in FIELDS],
         differences=differences(runs, labels) if several else None,
         same_assumed=len({run.assumed for run in runs}) == 1, cost=cost_table(runs, labels),
         versions=version_table(runs, labels), citations=citations(), bibtex=bibtex(), version=__version__)
@@ -153,6 +164,8 @@ def _flat(value: object) -> str:
 
 
 def _picture(path: Path, title: str, alt: str) -> Picture | None:
+    if not path.is_file():
+        path = path.with_suffix(".svg")  # as a run with `pictures = "svg"` leaves it
     if not path.is_file():
         return None
     with reported(f"cannot read {path}"):

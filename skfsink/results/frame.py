@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import meshio
 import numpy as np
 
+from ..errors import OutputError
 from ..fields.fragments import SPENT
+from ..fields.stress import principal_stresses
 
 __all__ = ["NODE", "SPENT", "Frame", "frame_file", "frame_of", "pieces_of_frame", "read_fields", "read_frame"]
 
@@ -30,6 +33,7 @@ class Frame:
     time: [s]; NaN where time means nothing.   label: what happens then; may be empty.
     u: displacement [mm], (n, dim).   gamma: relative density, (n,).   deleted: failed elements, (ne,) bool.
     v: velocity [mm/s], (n, dim), or None where it was not kept.
+    cells: values of the elements by name of the field, (ne,), as far as they were asked for.
     """
 
     time: float
@@ -38,6 +42,7 @@ class Frame:
     gamma: np.ndarray
     deleted: np.ndarray
     v: np.ndarray | None = None
+    cells: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     @property
     def title(self) -> str:
@@ -76,13 +81,28 @@ def _joined(values: list[np.ndarray], numbers: list[np.ndarray]) -> np.ndarray:
     return whole
 
 
-def read_frame(path: Path, time: float, label: str, dim: int) -> Frame:
-    """A frame of the ParaView series as the fields to draw."""
-    return frame_of(read_fields(path), time, label, dim)
+def read_frame(path: Path, time: float, label: str, dim: int, cells: Sequence[str] = ()) -> Frame:
+    """A frame of the ParaView series, from its file; see :func:`frame_of`."""
+    return frame_of(read_fields(path), time, label, dim, cells)
 
 
-def frame_of(data: meshio.Mesh, time: float, label: str, dim: int) -> Frame:
-    """A frame that was read as the fields to draw."""
+def frame_of(data: meshio.Mesh, time: float, label: str, dim: int, cells: Sequence[str] = ()) -> Frame:
+    """A frame as the fields to draw; `cells` names fields of the elements.
+
+    Raises
+    ------
+    OutputError
+        The frame has no such field.
+    """
     u, v = (np.asarray(data.point_data[name], float)[:, :dim] for name in ("displacement", "velocity"))
     return Frame(time, label, u, np.asarray(data.point_data["gamma"], float),
-                 np.asarray(data.cell_data["deleted"][0], bool), v)
+                 np.asarray(data.cell_data["deleted"][0], bool), v, {name: _cells(data, name) for name in cells})
+
+
+def _cells(data: meshio.Mesh, name: str) -> np.ndarray:
+    """Values of the elements; the greatest principal stress follows from the stress."""
+    if name in data.cell_data:
+        return np.asarray(data.cell_data[name][0], float)
+    if name == "principal_stress" and "stress" in data.cell_data:
+        return principal_stresses(np.asarray(data.cell_data["stress"][0], float))[:, -1]
+    raise OutputError(f"the frames have no field {name}: run the scene with --fields {name}")

@@ -6,9 +6,7 @@ they are asked for.
 
 from __future__ import annotations
 
-import contextlib
 import csv
-import io
 import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -23,10 +21,9 @@ from ..errors import OutputError
 from ..scene.stored import SCENE, StoredScene
 from ..system.files import reported
 from .fragments import FRAGMENTS, read_fragments
-from .frame import frame_file, read_fields
 from .history import History, Table, deletions_header
 from .probes import ProbeTable, read_probes
-from .series import frame_times
+from .stored_series import StoredSeries
 from .summary import SUMMARY, read_summary
 
 if TYPE_CHECKING:
@@ -37,7 +34,8 @@ __all__ = ["ENERGIES", "FIELD_UNITS", "Deletions", "Energy", "Frames", "Run", "l
 log = logging.getLogger(__name__)
 #: Units of the fields of a frame.
 FIELD_UNITS = {"displacement": "mm", "velocity": "mm/s", "gamma": "1", "deleted": "1", "W": "MPa", "gamma_element": "1",
-               "stress": "MPa", "pressure": "MPa", "von_mises": "MPa", "crushed": "1", "region": "1"}
+               "stress": "MPa", "pressure": "MPa", "von_mises": "MPa", "principal_stress": "MPa",
+               "stretch": "1", "crushed": "1", "region": "1", "fibre_1": "1", "fibre_2": "1"}
 #: Rows of :attr:`Run.energies`: name, columns of the history that add up to it, meaning.
 ENERGIES: tuple[tuple[str, tuple[str, ...], str], ...] = (
     ("elastic", ("elastic",), "elastic energy, γ-weighted"),
@@ -82,14 +80,15 @@ class Frames(Sequence[meshio.Mesh]):
     times: of the frames, in :attr:`Run.clock`: [s], or numbers of passes; load times [s] in a run that did not fail.
     name: "run", or "loading" for the frames of the loading.
     moments: frame number of onset, branching, arrival and end, as far as they happened.
-    units: of the fields.
+    units: of the fields.   stored: where they are read from.
     """
 
     units: Mapping[str, str] = FIELD_UNITS
 
     def __init__(self, folder: Path, moments: Mapping[str, int], name: str = "run") -> None:
         self.folder, self.moments, self.name = folder, dict(moments), name
-        self.times = np.array(frame_times(folder / f"{name}.pvd"))
+        self.stored = StoredSeries.of(folder, name)
+        self.times = np.array(self.stored.times)
 
     def __len__(self) -> int:
         return len(self.times)
@@ -112,17 +111,13 @@ class Frames(Sequence[meshio.Mesh]):
             There is no such frame. It ends a loop over the frames.
         OutputError
             There was no such moment, or the file is missing or damaged.
+        MissingExtra
+            The frames are in one VTKHDF file, and h5py is not installed.
         """
         if isinstance(key, str) and key not in self.moments:
             raise OutputError(f"{self.folder.parent} has no frame {key!r}; it has {', '.join(self.moments) or 'none'}")
         number = self.moments[key] if isinstance(key, str) else range(len(self))[key]
-        path = self.folder / frame_file(self.name, number)
-        printed = io.StringIO()
-        try:
-            with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed):  # meshio prints, and exits
-                mesh = read_fields(path)
-        except (Exception, SystemExit):
-            raise OutputError(f"{path} is missing or damaged") from None
+        mesh = self.stored.mesh(number)
         if deformed:
             mesh.points = mesh.points + mesh.point_data["displacement"]
         return mesh

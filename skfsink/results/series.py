@@ -20,6 +20,7 @@ from ..fem.space import Space
 from ..system.files import prepare_folder, replaced, reported, write_atomic
 from .frame import frame_file, pieces_of_frame
 from .history import HISTORY_COLUMNS, History
+from .vtkhdf import PackedSeries
 
 __all__ = ["HISTORY_COLUMNS", "History", "Series", "frame_mesh", "frame_times", "prepare_folder", "replaced",
            "write_atomic", "write_piece"]
@@ -53,6 +54,15 @@ class Series:
     def path(self) -> Path:
         """The PVD file, which ParaView opens."""
         return self.folder / f"{self.name}.pvd"
+
+    @property
+    def packed_path(self) -> Path:
+        """The file of all frames of a finished run that has one; see :mod:`.vtkhdf`."""
+        return self.folder / f"{self.name}.vtkhdf"
+
+    @property
+    def _packed(self) -> bool:
+        return self.packed_path.is_file() and not self.path.is_file()
 
     def frame(self, number: int) -> Path:
         """The file of a frame: VTU, or where ranks have written a piece each, the PVTU file that names them."""
@@ -122,6 +132,8 @@ class Series:
         OutputError
             There is no such series, or it has fewer frames.
         """
+        if n and self._packed:
+            return list(PackedSeries(self.packed_path).times[:n])
         failure = f"cannot resume the series of fields: {self.path}"
         try:
             times = [float(entry.attrib["timestep"]) for entry in ET.parse(self.path).iter("DataSet")] if n else []
@@ -141,6 +153,9 @@ class Series:
         """
         self.flush()
         self.times = self.check(n)
+        if n and self._packed:  # a finished run
+            return
+        self.packed_path.unlink(missing_ok=True)
         self._write_index()
         while (path := self.frame(n)).is_file():
             path.unlink()

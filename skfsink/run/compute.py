@@ -13,17 +13,19 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from ..errors import CheckpointError, Interrupted, ParameterError, first_line
+from ..errors import CheckpointError, Interrupted, ParameterError, SkfsinkError, first_line
 from ..fields.state import State
 from ..meshing.kept_mesh import MESH, keep_mesh
 from ..methods.ranks.integrator import RankOptions, ranks_text
 from ..methods.ranks.integrator import refuse as refuse_on_ranks
-from ..pictures.of_a_run import draw_comparison, draw_run
+from ..pictures.of_a_run import draw_comparison, draw_run, draw_what_there_is
 from ..results.history import History
 from ..results.probes import PROBES
 from ..results.result import Result
 from ..results.status import STATUS
+from ..results.stored_series import pack_series
 from ..results.summary import write_summary
+from ..results.vtkhdf import check_h5py
 from ..scene.case import Case
 from ..scene.deck import Deck
 from ..scene.described import made_in_python
@@ -183,6 +185,10 @@ def _check(scene: Scene, job: _Job) -> None:
     check_memory(scene, job.display)
     c = scene.controls
     refuse_on_ranks(scene, c.analysis, c.integrator, c.statics.linear, job.ranks.partition)
+    if c.series == "vtkhdf":
+        check_h5py()
+        if job.ranks.frame_pieces:
+            raise ParameterError("series vtkhdf has all frames in one file, and frame_pieces several a frame: take one")
     if not job.resumes:
         refuse(scene)
 
@@ -282,8 +288,22 @@ def _run_one(scene: Scene, job: _Job, onset: Loaded | None = None) -> Result:
         _write_scene(scene, job.folder, job.made_in_python)
     with told(job.folder, job.display, lambda: simulation.notes.texts):
         _announce(simulation, job)
-        state = simulation.run(onset)
+        try:
+            state = simulation.run(onset)
+        except SkfsinkError:
+            _unfinished(simulation, job)
+            raise
         return _finished(simulation, state, job)
+
+
+def _unfinished(simulation: Simulation, job: _Job) -> None:
+    """Pictures of a run that has stopped on its way; what goes wrong with them does not hide why it has stopped."""
+    try:
+        simulation.frames.close()
+        if draw_what_there_is(simulation.scene, job.folder, simulation.frames.moments):
+            job.display.say(f"pictures of what there is are in {job.folder}")
+    except (SkfsinkError, OSError, ValueError) as failed:
+        job.display.say(f"no pictures of the run so far: {first_line(failed)}")
 
 
 def _announce(simulation: Simulation, job: _Job) -> None:
@@ -311,6 +331,9 @@ def _finished(simulation: Simulation, state: State, job: _Job) -> Result:
     if scene.parameters.get("mesh_layout") == "two-pass":
         corridor["corridor"] = corridor_report(simulation, corridor_mesh(folder).parent)  # before the summary: it warns
     summary = {**summarize(scene, simulation), **corridor}
+    if scene.controls.series == "vtkhdf":
+        for name in ("run", "loading"):
+            pack_series(folder / "series", name)
     write_summary(folder / SUMMARY, summary)
     display.update(1.0, str(folder))
     display.say(summary["verdict"])

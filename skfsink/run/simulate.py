@@ -14,6 +14,7 @@ import numpy as np
 from ..errors import CheckpointError, ConvergenceError, Interrupted
 from ..fem.direct import one_thread_of_openblas
 from ..fields.body import Body
+from ..fields.frame_fields import ON_REQUEST, asked_fields
 from ..fields.state import State
 from ..methods.integrators import Integrator
 from ..methods.ranks.integrator import InParts, RankOptions, integrator_of
@@ -296,6 +297,6 @@ class Simulation:
 def standard_observers(scene: Scene, display: Display) -> list[Observer]:
     """The observers of every run, in the order in which they look."""
     c = scene.controls
-    every = c.record_every
-    return [Crack(every), History(every), Strength(), Onset(), Frames(c.frame_every), Guard(every), Deletions(),
-            Fragments(), Progress(display, every), Checkpoint(c.checkpoint_every)]
+    every, fields = c.record_every, [name for name in asked_fields(c.fields) if name in ON_REQUEST]
+    return [Crack(every), History(every), Strength(), Onset(), Frames(c.frame_every, fields=fields), Guard(every),
+            Deletions(), Fragments(), Progress(display, every), Checkpoint(c.checkpoint_every)]

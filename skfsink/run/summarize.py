@@ -57,6 +57,7 @@ def summarize(scene: Scene, simulation: Simulation) -> dict[str, Any]:
         "event": {"first_arrival_s": tracker.arrival if dynamic else None,
                   "first_arrival_pass": None if dynamic else tracker.arrival,
                   "mean_tip_speed_m_per_s": tracker.mean_speed() if dynamic else None,
+                  "tear_angle_degree": _tear_angle(scene, simulation),
                   "max_branches": tracker.max_branches, "separated": tracker.separated,
                   "duration_s": state.time if dynamic and onset else None,
                   "added_mass": simulation.integrator.added_mass if dynamic and simulation.integrator else None,
@@ -98,6 +99,27 @@ def crack_summary(scene: Scene, body: Body) -> list[dict[str, Any]]:
     return [{"name": crack.name, "lips": crack.lips, "elements": crack.elements.size, extent: crack.extent,
              "width_mm": crack.width(space), "lost_width_mm": None if whole is None else lost / whole}
             for crack in scene.cracks]
+
+
+def _tear_angle(scene: Scene, simulation: Simulation) -> float | None:
+    """Direction of the tear in the undeformed plane, from the x axis [degrees], in (-90, 90].
+
+    It is that from where the body begins to fail to the leading tip when the crack first arrives, or else at the end;
+    None of a body in space, or where no tip has left the place of the onset by more than l.
+    """
+    place, arrival = simulation.onset.figures.get("place_mm"), simulation.crack.tracker.arrival
+    if scene.space.dim == 3 or place is None:
+        return None
+    clock = "time_s" if scene.controls.analysis == "dynamic" else "step"
+    rows = [row for row in simulation.history.rows if row["phase"] == "event" and np.isfinite(row["tip_x_mm"])
+            and (arrival is None or row[clock] <= arrival)]
+    if not rows:
+        return None
+    x, y = rows[-1]["tip_x_mm"] - place[0], rows[-1]["tip_y_mm"] - place[1]
+    if np.hypot(x, y) < scene.sink_law.length_scale:
+        return None
+    angle = float(np.degrees(np.arctan2(y, x)))
+    return angle - 180.0 * np.ceil((angle - 90.0) / 180.0)
 
 
 def _material_point(scene: Scene, simulation: Simulation) -> dict[str, Any] | None:

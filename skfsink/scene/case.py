@@ -24,7 +24,7 @@ from .typed import Mistake, Record
 __all__ = ["Case", "CaseParameter", "shared_parameters"]
 
 #: parameters that a scene.toml of an earlier version has not; they take their defaults
-NEWER = ("merge_nodes", "pressures", "fillings", "body_forces", "velocities", "event_at")
+NEWER = ("merge_nodes", "pressures", "fillings", "body_forces", "velocities", "event_at", "fibres")
 
 
 @dataclass(frozen=True)

@@ -11,14 +11,17 @@ from ..errors import ParameterError, choose, require
 from ..fem.backends import backend
 from ..fem.elements import ELEMENTS
 from ..fields.density import GRADIENTS, SOLVERS
+from ..fields.frame_fields import asked_fields
 from ..fields.sinks import SINKS
 from ..methods.controls import ExplicitControls, HHTControls, StaticsControls
 from ..methods.integrators import INTEGRATORS
 
-__all__ = ["ANALYSES", "STARTS", "Controls"]
+__all__ = ["ANALYSES", "PICTURES", "SERIES", "STARTS", "Controls"]
 
 ANALYSES = ("dynamic", "quasistatic", "both")
 STARTS = ("onset", "rest")
+PICTURES = ("png", "pdf", "svg")
+SERIES = ("vtu", "vtkhdf")
 
 
 @dataclass(frozen=True)
@@ -50,6 +53,9 @@ class Controls:
     contact: the lips of cracks bear on each other (see :mod:`.contact`), in events and quasi-static passes.
     kernels: "compiled", or "forms" (scikit-fem forms, for small meshes), or another name in :data:`.BACKENDS`.
     bulk_viscosity_linear, bulk_viscosity_quadratic: coefficients b1 and b2 of the bulk viscosity, [0, 10].
+    fields: what is drawn besides the density, names of :data:`.frame_fields.DRAWN` with commas.
+    pictures: "png", "pdf" or "svg".
+    series: how the fields are stored, "vtu" (a file each frame) or "vtkhdf" (one file of all frames).
     """
 
     analysis: str = "dynamic"
@@ -74,6 +80,9 @@ class Controls:
     kernels: str = "compiled"
     bulk_viscosity_linear: float = 0.0
     bulk_viscosity_quadratic: float = 0.0
+    fields: str = ""
+    pictures: str = "png"
+    series: str = "vtu"
     explicit: ExplicitControls = field(default_factory=ExplicitControls)
     hht: HHTControls = field(default_factory=HHTControls)
     statics: StaticsControls = field(default_factory=StaticsControls)
@@ -96,6 +105,9 @@ class Controls:
         choose("density_solver", self.density_solver, SOLVERS)
         choose("element", self.element, ELEMENTS)
         backend(self.kernels)
+        asked_fields(self.fields)
+        choose("pictures", self.pictures, PICTURES)
+        choose("series", self.series, SERIES)
         require("overshoot", self.overshoot, low=0, high=0.1, low_open=True)
         require("deletion", self.deletion, low=0, high=1e-2, low_open=True)
         require("force_floor", self.force_floor, low=0, high=0.1)

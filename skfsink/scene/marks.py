@@ -13,7 +13,7 @@ from ..loads.grips import Ramp
 from ..units import number_in
 from .course_file import SUFFIX, read_course
 
-__all__ = ["MOST", "Course", "Place", "PressureCourse", "Still", "Vector", "Way", "plain"]
+__all__ = ["MOST", "Course", "Direction", "Place", "PressureCourse", "Still", "Vector", "Way", "plain"]
 
 MOST = 1000  # tables of a kind, points of a ramp
 RISE = 1.0   # load time [s] in which a pressure that is given by its value rises to it
@@ -106,6 +106,21 @@ class Vector:
         if not isinstance(value, list | tuple) or not 2 <= len(value) <= 3:
             raise ParameterError(f" must be a list of a number for each axis; got {value!r:.80}")
         return [require("", number_in("", item, self.unit), self.unit) for item in value]
+
+
+class Direction:
+    """Mark in the annotation of a direction: a word, or a list of numbers."""
+
+    WORDS = ("circumferential", "axial")
+
+    def read(self, value: Any) -> str | list[float]:
+        """The word or the numbers; the ParameterError is to follow the name of the field."""
+        if isinstance(value, list | tuple):
+            return Vector("").read(value)
+        if value not in self.WORDS:
+            raise ParameterError(f" must be {', '.join(self.WORDS)}, or a list of a number for each axis; got "
+                                 f"{value!r:.80}")
+        return str(value)
 
 
 def plain(course: Any) -> Any:

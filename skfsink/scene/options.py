@@ -181,6 +181,13 @@ class Options:
     threads
         Threads that share factorisations and loops over elements, >= 0; 0 takes one for a plane body and else
         OMP_NUM_THREADS or the machine's cores, at most 4. Runs with the same number agree to the last bit.
+    fields
+        What is drawn besides γ and the speed, with commas, of von_mises, principal_stress (the greatest), pressure,
+        stretch (the greatest principal one) and W (energy density).
+    pictures
+        Format of the pictures: "png", "pdf" or "svg"; films are GIFs.
+    series
+        Files of the fields: "vtu" (one a frame) or "vtkhdf" (one of all, made at the end of the run; needs h5py).
     out
         Output folder; default results/CASE/MESH-ANALYSIS[-INTEGRATOR].
     resume
@@ -254,6 +261,9 @@ class Options:
     frame_every: Annotated[float, CONTROLS, Unit("s")] = Controls.frame_every
     checkpoint_every: Annotated[float, CONTROLS, Unit("s")] = Controls.checkpoint_every
     threads: Annotated[int, CONTROLS] = Controls.threads
+    fields: Annotated[str, OUTPUT] = Controls.fields
+    pictures: Annotated[str, OUTPUT] = Controls.pictures
+    series: Annotated[str, OUTPUT] = Controls.series
     out: Annotated[Path | None, OUTPUT] = None
     resume: Annotated[Path | None, OUTPUT] = None
     overwrite: Annotated[bool, OUTPUT, FLAG] = False

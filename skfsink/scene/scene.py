@@ -25,6 +25,7 @@ from ..meshing.sample import Sample
 from ..meshing.symmetry import Whole
 from .controls import Controls
 from .digest import digest
+from .fibres import directions_of
 from .stored import StoredScene
 
 __all__ = ["Scene"]
@@ -191,6 +192,11 @@ class Scene:
     def parts(self) -> tuple[Region, ...]:
         """The body by its materials: what is in no region first, with an empty name, if there is any."""
         return divided(self.sample.space.n_elements, self.material, self.sink_law, self.regions)
+
+    @property
+    def fibres(self) -> np.ndarray | None:
+        """Directions of the fibres of the elements, (ne, families, 3), NaN where there are none; None without any."""
+        return directions_of(self.parts, self.space.X[self.space.conn].mean(axis=1))
 
     @property
     def region_numbers(self) -> np.ndarray:

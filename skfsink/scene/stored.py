@@ -19,7 +19,8 @@ __all__ = ["CORRIDOR", "SCENE", "TABLES", "StoredScene", "corridor_mesh", "kept_
 
 SCENE, CORRIDOR = "scene.toml", "corridor.vtu"
 #: parameters that are tables, which stand beside the table `parameters` of a file
-TABLES = ("grips", "tractions", "pressures", "fillings", "body_forces", "velocities", "regions", "probes", "cracks")
+TABLES = ("grips", "tractions", "pressures", "fillings", "body_forces", "velocities", "regions", "fibres", "probes",
+          "cracks")
 HEAD = ("# A run of skfsink. Run it again with: skfsink run scene.toml\n"
         "# Plain numbers are in N, mm, MPa and s; density in kg/m^3.\n")
 

@@ -28,16 +28,16 @@ from ..material import MATERIALS, own_constants
 from ..material.regions import RegionLaw, one_bulk_modulus
 from ..meshing.cracks import InitialCrack, crack_along, crack_of_elements
 from ..meshing.sample import Sample
-from ..units import Unit
+from ..units import Unit, kind_and_unit
 from .course_file import SUFFIX
-from .marks import MOST, Course, Place, PressureCourse, Still, Vector, Way, plain
+from .marks import MOST, Course, Direction, Place, PressureCourse, Still, Vector, Way, plain
 from .typed import Mistake, Record
 
-__all__ = ["beside", "body_forces_of", "cracks_of", "grips_of", "pressures_of", "read_tables", "regions_of",
-           "tractions_of", "velocities_of"]
+__all__ = ["beside", "body_forces_of", "cracks_of", "grips_of", "number_fields", "pressures_of", "read_tables",
+           "regions_of", "tractions_of", "velocities_of"]
 
 AXES = ("x", "y", "z")
-SINGULAR = {"body_forces": "body force", "velocities": "velocity"}
+SINGULAR = {"body_forces": "body force", "velocities": "velocity", "fibres": "fibres of"}
 
 
 def _message(kind: str, mistake: Mistake, table: Any) -> str:
@@ -67,13 +67,24 @@ TYPES: Mapping[str, Mapping[str, Any]] = {
     "probes": {"name": str, "kind": str, "position": Annotated[list, Place()], "to": Annotated[list, Place()],
                "points": int, "boundary": str, "to_boundary": str, "quantity": str, "radius": float,
                "every": Annotated[float, Unit("s")], "every_passes": int},
+    "fibres": {"region": str, "direction": Annotated[list, Direction()], "array": str,
+               "azimuth": Annotated[float, Unit("degree")], "elevation": Annotated[float, Unit("degree")],
+               "axis": Annotated[list, Vector("")], "centre": Annotated[list, Vector("mm")],
+               "normal": Annotated[list, Vector("")]},
     "cracks": {"name": str, "points": Annotated[list, Way()], "lips": str, "width": Annotated[float, Unit("mm")],
                "elements": str}}
-WITHOUT_NAME = ("body_forces", "velocities")  # kinds whose first field may be left out: they are of the whole body then
+#: kinds whose first field may be left out: they are of the whole body then
+WITHOUT_NAME = ("body_forces", "velocities", "fibres")
 #: fields of a table that may not be left out, where these are others than the first
 NEEDED = {"fillings": ("boundary", "inflow", "compliance"), **dict.fromkeys(WITHOUT_NAME, ())}
 RECORDS = {kind: Record(types, partial(_message, kind), needed=NEEDED.get(kind, (next(iter(types)),)), finite=True)
            for kind, types in TYPES.items()}
+
+
+def number_fields(kind: str) -> dict[str, str]:
+    """Fields of a table of a kind that are plain numbers, with their units."""
+    found = {name: kind_and_unit(annotation) for name, annotation in TYPES[kind].items()}
+    return {name: unit for name, (type_, unit) in found.items() if type_ is float}
 
 
 def read_tables(kind: str, tables: Any) -> tuple[dict[str, Any], ...]:
@@ -96,7 +107,9 @@ def read_tables(kind: str, tables: Any) -> tuple[dict[str, Any], ...]:
                                      f"[time, pressure]) or a rate; got {'both' if 'rate' in table else 'neither'}")
     for table in read if kind == "grips" else ():
         _one_kind(table)
-    if kind not in ("tractions", *WITHOUT_NAME):
+    for table in read if kind == "fibres" else ():
+        _one_direction(table)
+    if kind not in ("tractions", "body_forces", "velocities"):
         return tuple(read)
     return tuple({name: course for name, course in table.items() if course != 0.0} for table in read)
 
@@ -112,6 +125,19 @@ def _one_kind(table: Mapping[str, Any]) -> None:
     if ("angle" in table) != ("centre" in table) or ("axis" in table and "angle" not in table):
         raise ParameterError(f"grip {name} must have angle and centre together, and in space an axis; got "
                              f"{', '.join(key for key in ('angle', 'centre', 'axis') if key in table)}")
+
+
+def _one_direction(table: Mapping[str, Any]) -> None:
+    """Refuse fibres whose direction is not given, or twice (ParameterError)."""
+    of = f"fibres of {table['region']}" if "region" in table else "fibres of the body"
+    given = [key for key in ("direction", "array", "azimuth") if key in table]
+    if len(given) != 1:
+        raise ParameterError(f"{of} must have one of direction, array and azimuth; got {' and '.join(given) or 'none'}")
+    if "elevation" in table and "azimuth" not in table:
+        raise ParameterError(f"{of}: elevation goes with azimuth")
+    around = isinstance(table.get("direction"), str)
+    if odd := [key for key in ("axis", "centre") if key in table and not around]:
+        raise ParameterError(f"{of}: {odd[0]} is for the directions circumferential and axial")
 
 
 def _with_constants(table: Mapping[str, Any]) -> dict[str, Any]:

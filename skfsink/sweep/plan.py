@@ -16,12 +16,12 @@ from ..meshing.kept_mesh import MESH
 from ..meshing.sample import file_sample
 from ..run.display import Display
 from ..scene.deck import Deck, read_deck
-from ..scene.registry import find_case
 from ..system.files import reported, write_atomic
 from .engine import here, on_scheduler
 from .one import DECK, FAILURE, RUN, finished
-from .table import draw, read_rows, read_units, write_csv, write_parquet
-from .vary import combinations, read_variation
+from .sweep_picture import draw
+from .table import read_rows, read_units, write_csv, write_parquet
+from .vary import combinations, read_variation, with_values
 
 __all__ = ["run_sweep"]
 
@@ -39,12 +39,12 @@ def run_sweep(path: Path, vary: Sequence[str], out: Path, *, jobs: int = 1, sche
     """
     require("jobs", jobs, low=1, high=256, whole=True)
     deck = read_deck(path)
-    case = find_case(deck.case)
-    variations = [read_variation(text, case) for text in vary]
-    varied = list(combinations(variations))
+    variations = [read_variation(text, deck) for text in vary]
+    names = [variation.name for variation in variations]
+    varied = list(combinations([(variation.name, variation.values) for variation in variations]))
     folders = [out / _name(values) for values in varied]
-    _lay_out(deck, [_beside(values, path.parent) for values in varied], folders)
-    names = [name for name, _ in variations]
+    _lay_out([replace(deck, parameters=with_values(variations, _beside(values, path.parent), deck.parameters))
+              for values in varied], folders)
     with Display(quiet) as display:
         display.phase("sweep")
         left = [folder for folder in folders if not finished(folder)]
@@ -65,7 +65,7 @@ def run_sweep(path: Path, vary: Sequence[str], out: Path, *, jobs: int = 1, sche
         if parquet:
             write_parquet(rows, out / "sweep.parquet", units)
         if any(row["analysis"] for row in rows):
-            draw(rows, names, out / "sweep.png", units)
+            draw(rows, names, out / "sweep.png", {**units, **{one.name: one.what.unit for one in variations}})
         display.update(1.0, str(out))
     return rows
 
@@ -102,16 +102,15 @@ def _moved(present: Path, text: str) -> bool:
     return True
 
 
-def _lay_out(deck: Deck, varied: Sequence[Mapping[str, Any]], folders: Sequence[Path]) -> None:
+def _lay_out(decks: Sequence[Deck], folders: Sequence[Path]) -> None:
     """Make the folders and their decks; refuse those of another sweep.
 
     The mesh file may have moved: runs that were begun keep their mesh, the others take it from where it is now.
     """
     texts = []
-    for values in varied:
-        whole = replace(deck, parameters={**deck.parameters, **values})
-        whole.check()
-        texts.append(whole.toml())
+    for deck in decks:
+        deck.check()
+        texts.append(deck.toml())
     for folder, text in zip(folders, texts):
         present = folder / DECK
         if present.is_file() and present.read_text(encoding="utf-8") != text and not _moved(present, text):

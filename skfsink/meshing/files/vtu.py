@@ -34,7 +34,7 @@ TYPES = {BIT: "u1", "Float32": "f4", "Float64": "f8",
 
 
 def read_vtu(path: Path) -> meshio.Mesh:
-    """The mesh in a VTU file, with its arrays of one component.
+    """The mesh in a VTU file, with its arrays of one component and its vectors: arrays of three components.
 
     Raises
     ------
@@ -82,14 +82,19 @@ def _mesh(root: ET.Element, arrays: _Arrays) -> meshio.Mesh:
         connectivity.append(n_points + nodes)
         n_points, n_nodes = n_points + len(points[-1]), n_nodes + len(nodes)
         for kind, n_values in (("PointData", len(points[-1])), ("CellData", n)):
-            data[kind].append({str(array.get("Name")): arrays.read(array, n_values)
-                               for array in piece.findall(f"{kind}/DataArray")
-                               if array.get("NumberOfComponents", "1") in ("", "1") and array.get("type") in TYPES})
+            data[kind].append({
+                str(array.get("Name")): arrays.read(array, n_values, int(array.get("NumberOfComponents") or 1))
+                for array in piece.findall(f"{kind}/DataArray") if array.get("type") in TYPES
+                and (array.get("NumberOfComponents", "1") in ("", "1") or _is_vector(array))})
     point_data, cell_data = (
         {name: np.concatenate([part[name] for part in parts]) for name in parts[0] if all(name in p for p in parts)}
         for parts in data.values())
     return vtk_mesh(np.concatenate(points), np.concatenate(connectivity), np.concatenate(ends), np.concatenate(types),
                     cell_data, point_data)
+
+
+def _is_vector(array: ET.Element) -> bool:
+    return array.get("NumberOfComponents") == "3" and array.get("type") in ("Float32", "Float64")
 
 
 class _Arrays:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ...fields.frame_fields import ON_REQUEST
 from ...fields.momentum import Momentum
 from ...fields.state import State
 from ...fields.stress import cauchy_stress, pressure, von_mises
@@ -30,6 +31,7 @@ class Frames(Observer):
     Parameters
     ----------
     every: time between frames of the event [s].   every_passes: passes between them in a quasi-static one.
+    fields: names of :data:`.frame_fields.ON_REQUEST` that frames have besides the others.
 
     Attributes
     ----------
@@ -40,8 +42,8 @@ class Frames(Observer):
     LOADING = 50.0  # of the way of the loading: its frames are at least that part of it apart
     kept = ("times", "loading_times", "moments", "framed")
 
-    def __init__(self, every: float, every_passes: int = 10) -> None:
-        self.every, self.every_passes = every, every_passes
+    def __init__(self, every: float, every_passes: int = 10, fields: Sequence[str] = ()) -> None:
+        self.every, self.every_passes, self.fields = every, every_passes, tuple(fields)
         self.times: list[float] = []
         self.loading_times: list[float] = []
         self.moments: dict[str, int] = {}
@@ -53,7 +55,9 @@ class Frames(Observer):
         self._new = memory is None
         space, folder = view.body.space, view.folder / "series"
         self.series, self.loading_series = Series(folder, "run", space), Series(folder, "loading", space)
-        self._regions = {"region": view.scene.region_numbers} if view.scene.regions else {}
+        self._still = {"region": view.scene.region_numbers} if view.scene.regions else {}
+        if (fibres := view.scene.fibres) is not None:
+            self._still |= {f"fibre_{f + 1}": np.nan_to_num(fibres[:, f]) for f in range(fibres.shape[1])}
         self.series.check(len(self.times))
         self.loading_series.check(len(self.loading_times))
 
@@ -96,11 +100,11 @@ class Frames(Observer):
     def _add(self, series: Series, view: View) -> None:
         state, parts = view.state, view.integrator
         if isinstance(parts, InParts) and parts.options.frame_pieces:
-            names = {region.name: number for number, region in enumerate(view.scene.regions, 1)}
-            series.add_pieces(state.time, parts.crew.size, lambda folder: parts.each(_write_piece, folder, names))
+            series.add_pieces(state.time, parts.crew.size,
+                              lambda folder: parts.each(_write_piece, folder, self.fields, self._still))
             view.framed = True
             return
-        series.add(state.time, *_fields(view.body.momentum, state, view.stress, self._regions))
+        series.add(state.time, *_fields(view.body.momentum, state, view.stress, self.fields, self._still))
 
     def finish(self, view: View) -> None:
         """Wait until all frames are written."""
@@ -121,25 +125,22 @@ class Frames(Observer):
         return super().memory()
 
 
-def _fields(momentum: Momentum, state: State, stress: np.ndarray,
-            regions: Mapping[str, np.ndarray]) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """What a frame has on points, and on cells."""
+def _fields(momentum: Momentum, state: State, stress: np.ndarray, names: Sequence[str],
+            still: Mapping[str, np.ndarray]) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+    """What a frame has on points, and on cells; `still` is the same in all frames."""
     space = momentum.space
     return ({"displacement": state.u, "velocity": state.v, "gamma": state.gamma},
             {"deleted": state.deleted.astype(np.int8), "W": space.element_mean(np.minimum(momentum.W, 1e3)),
              "gamma_element": space.element_mean(momentum.gamma), "stress": stress, "pressure": pressure(stress),
-             "von_mises": von_mises(stress), "crushed": np.isnan(stress).any(axis=1).astype(np.int8), **regions})
+             "von_mises": von_mises(stress), "crushed": np.isnan(stress).any(axis=1).astype(np.int8),
+             **{name: ON_REQUEST[name](momentum, state.u, stress) for name in names if name in ON_REQUEST}, **still})
 
 
-def _write_piece(member: Member, folder: Path, names: Mapping[str, int]) -> list[str]:
-    """Write what a rank has of a frame; `names` are the regions of the scene with their numbers."""
+def _write_piece(member: Member, folder: Path, names: Sequence[str], still: Mapping[str, np.ndarray]) -> list[str]:
+    """Write what a rank has of a frame; see :func:`_fields`, `still` is of the whole body."""
     assert member.part is not None
     numbers, momentum, space = member.part.numbers, member.body.momentum, member.body.space
-    regions = {}
-    if names:
-        regions["region"] = np.zeros(space.n_elements, np.int32)
-        for region in momentum.regions:
-            regions["region"][region.elements] = names[region.name]
-    points, cells = _fields(momentum, member.state, cauchy_stress(momentum, member.state.u), regions)
+    points, cells = _fields(momentum, member.state, cauchy_stress(momentum, member.state.u), names,
+                            {name: values[numbers.elements] for name, values in still.items()})
     return write_piece(folder, member.comm.rank, frame_mesh(
         space, {**points, NODE: numbers.nodes}, {**cells, ELEMENT: numbers.elements}))
