@@ -20,7 +20,7 @@ from skfsink.fem.space import Space
 from skfsink.fields.state import State
 from skfsink.loads.grips import Grip, Ramp
 from skfsink.meshing.sample import Sample
-from skfsink.report.tables import key_table
+from skfsink.results.tables import key_table
 from skfsink.results.loader import load
 from skfsink.run.observers import places
 from skfsink.scene.scene import Scene

@@ -26,7 +26,7 @@ from skfsink.meshing.vtu import write_mesh
 from skfsink.pictures import plot
 from skfsink.report import charts, citation, report_page, write_report
 from skfsink.report.scenes import command_line, run_labels
-from skfsink.report.tables import energy_tables
+from skfsink.results.tables import energy_tables
 from skfsink.results import reference
 from skfsink.results.history import HISTORY_COLUMNS, OF_PRESSURES, History
 from skfsink.results.loader import ENERGIES, FIELD_UNITS

@@ -7,13 +7,16 @@ from pathlib import Path
 
 import numpy as np
 
+from ..errors import OutputError
 from ..results.fragments import FRAGMENTS, read_fragments
 from ..results.frame import Frame, frame_file, read_frame
 from ..results.history import History
+from ..results.loader import Run, load
 from ..results.probes import read_probes
 from ..results.result import Result
 from ..results.series import frame_times
 from ..scene.scene import Scene
+from ..system.files import path_of
 from .piece_picture import piece_picture
 from .plot import (
     animation,
@@ -26,9 +29,10 @@ from .plot import (
 )
 from .probe_curves import probe_picture
 
-__all__ = ["draw_comparison", "draw_run"]
+__all__ = ["draw_comparison", "draw_run", "picture"]
 
 _WORDS = {"onset": "onset", "branching": "first branches", "arrival": "first arrival", "end": "end"}
+FORMATS = (".pdf", ".svg", ".png")  # of pictures that are drawn again
 
 
 def draw_run(scene: Scene, folder: Path, series: str, moments: Mapping[str, int]) -> None:
@@ -103,12 +107,60 @@ def _frame(folder: Path, number: int, time: float, word: str, scene: Scene) -> F
                       scene.sample.space.dim)
 
 
+def picture(run: Run | str | Path, path: str | Path, title: str | None = None) -> Path:
+    """Draw the main picture of a run again, as for a paper: γ on the deformed body at the key moments, or of
+    `analysis="both"` both analyses with their energies.
+
+    Parameters
+    ----------
+    run: a run or its folder.
+    path: of the picture; its suffix is the format: ".pdf", ".svg", ".png".
+    title: above it; left out: that of the run, "" for none.
+
+    Returns
+    -------
+    The path.
+
+    Raises
+    ------
+    OutputError
+        The folder holds no finished run, or the format is unknown.
+    """
+    run, path = run if isinstance(run, Run) else load(run), path_of("path", path)
+    if not all(part.finished for part in run.runs):
+        raise OutputError(f"the run in {run.folder} is not finished: there is no picture to draw")
+    if path.suffix.lower() not in FORMATS:
+        raise OutputError(f"a picture is drawn as {', '.join(FORMATS)}; got {path.name}")
+    scene = run.scene
+    name = f"{scene.title}, mesh {scene.sample.name}" if title is None else title
+    if run.parts and all(part.summary["series"] == "run" for part in run.runs):
+        _comparison(scene, run.parts["dynamic"], run.parts["quasistatic"], path, name)
+    else:
+        _density(scene, run.runs[0], path, name)
+    return path
+
+
+def _density(scene: Scene, run: Run, path: Path, title: str) -> None:
+    words = {number: _WORDS.get(label, label) for label, number in run.frames.moments.items()}
+    loading, keys = run.frames.name == "loading", sorted(words) or [len(run.frames) - 1]
+    quasistatic = run.analysis == "quasistatic" and not loading
+    shown = [read_frame(run.folder / "series" / frame_file(run.frames.name, i),
+                        np.nan if quasistatic or loading else run.frames.times[i],
+                        f"load time {run.frames.times[i]:.4g} s" if loading else words[i], scene.space.dim)
+             for i in keys]
+    density_picture(scene.space, shown, path, title, scene.view)
+
+
 def draw_comparison(dynamic: Result, quasistatic: Result, folder: Path) -> None:
     """`comparison.png`: the dynamic crack beside the quasi-static one, at the end of each."""
-    frames = []
-    space = dynamic.scene.sample.space
+    _comparison(dynamic.scene, dynamic, quasistatic, folder / "comparison.png",
+                f"{dynamic.scene.title}, mesh {dynamic.scene.sample.name}")
+
+
+def _comparison(scene: Scene, dynamic: Run, quasistatic: Run, path: Path, title: str) -> None:
+    frames, space = [], scene.sample.space
     for part in (dynamic, quasistatic):
         number = part.summary["moments"].get("arrival", part.summary["moments"]["end"])
         frames.append(read_frame(part.folder / "series" / frame_file("run", number), np.nan, "", space.dim))
-    comparison_picture(space, frames[0], frames[1], dynamic.history, quasistatic.history, folder / "comparison.png",
-                       title=f"{dynamic.scene.title}, mesh {dynamic.scene.sample.name}", view=dynamic.scene.view)
+    comparison_picture(space, frames[0], frames[1], dynamic.history, quasistatic.history, path, title=title,
+                       view=scene.view)

@@ -7,11 +7,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..results.loader import Run
+from ..results.tables import EMPTY, Row, Table
 from ..scene.case import CaseParameter, shared_parameters
 from ..scene.options import Options
 from ..scene.registry import CASES, find_case
 from ..scene.stored import SCENE, TABLES
-from .tables import EMPTY, Row, Table
 
 __all__ = ["command_line", "differences", "meanings", "parameter_table", "run_labels"]
 
