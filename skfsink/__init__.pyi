@@ -36,6 +36,7 @@ from .material.library import material_from as material_from
 from .material.materials import materials as materials
 from .material.regions import RegionLaw as RegionLaw
 from .material.sink import SinkLaw as SinkLaw
+from .meshing.grid import grid_mesh as grid_mesh
 from .meshing.outline import Edge as Edge
 from .meshing.outline import SizeField as SizeField
 from .meshing.outline import completed as completed
