@@ -1,8 +1,8 @@
 """A strip with fibres, and which way it tears.
 
-Adventitia with two families of fibres at 20 degrees to a direction that is inclined to the strip by 45 degrees, and then
-by -45. The number: both strips are mirror images of each other, and so must be the ways of their tears: the sum of the
-directions is 0. Rounding and single elements are allowed 5 degrees.
+Adventitia with two families of fibres at 20 degrees to a direction that is inclined to the strip by 45 degrees, and
+then by -45. The number: both strips are mirror images of each other, and so must be the ways of their tears: the sum
+of the directions is 0. Rounding and single elements are allowed 5 degrees.
 """
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""Runs the examples and keeps their pictures for the gallery of the documentation: `python examples/make_gallery.py [NAME]`.
+"""Runs the examples and keeps their pictures for the gallery: `python examples/make_gallery.py [NAME]`.
 
 Each runs in a folder of its own, `results/gallery/NAME`, and leaves `NAME.png` there. The picture goes, made small, to
 `docs/images/examples`, with a hash of the script that made it; a test holds the two together. Four minutes in all.
@@ -46,7 +46,8 @@ def run(name: str) -> None:
     """Run an example and keep its picture."""
     folder = HERE.parent / "results" / "gallery" / name
     folder.mkdir(parents=True, exist_ok=True)
-    subprocess.run([sys.executable, HERE / f"{name}.py"], cwd=folder, check=True, env={**os.environ, "MPLBACKEND": "Agg"})
+    environment = {**os.environ, "MPLBACKEND": "Agg"}
+    subprocess.run([sys.executable, HERE / f"{name}.py"], cwd=folder, check=True, env=environment)
     keep(folder / f"{name}.png", name)
 
 

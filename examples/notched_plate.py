@@ -1,8 +1,8 @@
 """A notched plate: load it, let its crack run, look.
 
 The single-edge notched plate of the paper (Sec. 5.1) on its coarse mesh, up to the moment at which the crack has run
-for 1 mm. The number: the opening at the onset converges to 0.1249 mm as elements get smaller, and meshes with rings of
-elements around the notch are within 0.3 % of it whatever their size (docs/convergence.md).
+for 1 mm. The number: the opening at the onset converges to 0.1249 mm as elements get smaller, and meshes with rings
+of elements around the notch are within 0.3 % of it whatever their size (docs/convergence.md).
 """
 
 import skfsink as sk

@@ -1,8 +1,8 @@
 """A material of one's own: Demiray's exponential law of soft tissue.
 
-One class and one compiled function. A sheet of it, in plane stress, is pulled until it is about to fail. The number: the
-nominal stress of uniaxial tension, 2 psi' (s - 1/s^2), times the density that the sink has left; at k/mu = 830 the
-sheet is incompressible to 0.5 %.
+One class and one compiled function. A sheet of it, in plane stress, is pulled until it is about to fail. The number:
+the nominal stress of uniaxial tension, 2 psi' (s - 1/s^2), times the density that the sink has left; at k/mu = 830
+the sheet is incompressible to 0.5 %.
 """
 
 from dataclasses import dataclass, replace

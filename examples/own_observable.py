@@ -1,9 +1,9 @@
 """A quantity of one's own, and an end of one's own.
 
-The plate of the paper with a hole, pulled on four sides (docs/decks.md). An observer follows the stretch of the rim; the
-loading ends when it is 1.15, before anything softens. The number: an incompressible body in plane strain has no choice,
-r^2 = R^2 + c, so the stretch of a circle of 1 mm follows from that of the rim of 0.5 mm. The bulk modulus, 400 times the
-shear modulus, lets the circle grow by less than 1 % of its own growth.
+A plate with a hole, pulled on four sides (docs/decks.md). An observer follows the stretch of the rim; the loading
+ends when it is 1.15, before anything softens. The number: an incompressible body in plane strain has no choice, r^2 =
+R^2 + c, so the stretch of a circle of 1 mm follows from that of the rim of 0.5 mm. The plate is compressible, by a
+bulk modulus of 400 shear moduli, and coarse: 10 % of what the circle is stretched by is allowed.
 """
 
 import matplotlib.pyplot as plt
@@ -28,8 +28,10 @@ class Circles(sk.Observer):
 
 
 circles = Circles()
-plate = sk.read_deck(sk.data_folder("biaxial_hole") / "scene.toml").run(
-    out="results/circles", overwrite=True, observers=[circles], stop=lambda view: circles.rows[-1][0] > 1.15)
+sides = {"left": {"x": "-1 um/s"}, "bottom": {"y": "-1 um/s"}, "top": {"y": "1 um/s"}, "right": {"x": "1 um/s"}}
+plate = sk.custom(mesh=sk.data_folder("biaxial_hole") / "meshes" / "coarse.vtu", title="A plate with a hole",
+                  grips=[{"boundary": name, **motion} for name, motion in sides.items()], observers=[circles],
+                  stop=lambda view: circles.rows[-1][0] > 1.15, out="results/circles", overwrite=True)
 rim, circle, R = np.array(circles.rows).T
 closed = np.sqrt(1 + (rim**2 - 1) * 0.25 / R**2)
 figure, axes = plt.subplots(figsize=(5, 3), layout="constrained")
@@ -39,4 +41,4 @@ axes.set(xlabel="stretch of the rim", ylabel="stretch of a circle of 1 mm")
 axes.legend()
 figure.savefig("own_observable.png", dpi=120)
 print(f"{circle[-1]:.4f}, closed form {closed[-1]:.4f}")
-assert abs((circle[-1] - 1) / (closed[-1] - 1) - 1) < 0.02
+assert abs((circle[-1] - 1) / (closed[-1] - 1) - 1) < 0.1

@@ -1,9 +1,9 @@
 """A sample of one's own: a plate with a hole, meshed from its outline.
 
-A quarter of it, 10 mm on each side, with a hole of radius 1 mm and rings of elements around that; needs gmsh (the extra
-mesh). The number: Kirsch's stress beside the hole, 3 times that far away at its rim, (2 + 1/r^2 + 3/r^4)/2 at a distance
-r. Mean over the first half of a radius: there a plate ten times as large as its hole has 1 to 2 % more than an endless
-one; 3 % is allowed.
+A quarter of it, 10 mm on each side, with a hole of radius 1 mm and elements of 0.1 mm around that; needs gmsh (the
+extra mesh). The number: Kirsch's stress beside the hole, 3 times that far away at its rim, (2 + 1/r^2 + 3/r^4)/2 at a
+distance r. Mean over the first half of a radius: there a plate ten times as large as its hole has 1 to 2 % more than
+an endless one; 3 % is allowed.
 """
 
 import matplotlib.pyplot as plt

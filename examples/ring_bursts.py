@@ -1,9 +1,9 @@
 """A pressurised ring bursts.
 
-The section of an artery: inner radius 1 mm, wall 0.2 mm of the tissue of the paper, plane strain, with a weak place at
-the top. The number: while nothing softens, the pressure is that of an incompressible thick ring that has swept the area
-pi c, p = integral of 2 psi' (s^2 - 1/s^2) R/(R^2 + c) dR with s^2 = 1 + c/R^2. The weak place is as stiff as the rest;
-three elements through the wall and k/mu = 400 leave less than 1 %.
+The section of an artery: inner radius 1 mm, wall 0.2 mm of the tissue of the paper, plane strain, with a weak place
+at the top. The number: while nothing softens, the pressure is that of an incompressible thick ring that has swept the
+area pi c, p = integral of 2 psi' (s^2 - 1/s^2) R/(R^2 + c) dR with s^2 = 1 + c/R^2. The weak place is as stiff as the
+rest; three elements through the wall and k/mu = 400 leave less than 1 %.
 """
 
 import numpy as np

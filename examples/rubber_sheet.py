@@ -13,7 +13,8 @@ import skfsink as sk
 sk.write_mesh("sheet.vtu", sk.grid_mesh(np.linspace(0, 2, 5), np.linspace(0, 1, 3)))
 sheet = sk.custom(mesh="sheet.vtu", title="A rubber sheet", element="planestress", material="gent",
                   length_scale="2 mm", stop="displacement > 4 mm", out="results/sheet", overwrite=True, grips=[
-                      {"boundary": "right", "x": "1 mm/s"}, {"boundary": "bottom", "y": 0}, {"boundary": "left", "x": 0}])
+                      {"boundary": "right", "x": "1 mm/s"}, {"boundary": "bottom", "y": 0},
+                      {"boundary": "left", "x": 0}])
 
 stretch, stress = 1 + sheet.history["grip_displacement_mm"] / 2, sheet.history["reaction_N_per_mm"]  # 1 mm wide
 gent = sk.materials.gent()

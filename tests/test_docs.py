@@ -12,6 +12,7 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
+from PIL import Image
 from plates import invoke_program, plate
 
 import skfsink
@@ -26,6 +27,7 @@ from skfsink.methods.controls import StaticsControls
 from skfsink.methods.integrators import INTEGRATORS
 from skfsink.methods.statics import Statics
 from skfsink.results.history import HISTORY_COLUMNS
+from skfsink.run import compute
 from skfsink.run.observers.history import VALUES
 from skfsink.scene.options import Options
 from skfsink.scene.registry import CASES, find_case
@@ -55,6 +57,11 @@ def made(name: str) -> ModuleType:
 
 
 # --- examples ---
+def blank(path: Path) -> None:
+    """A picture in place of one that takes long to draw."""
+    Image.new("RGB", (20, 10), "white").save(path)
+
+
 @pytest.fixture
 def registries() -> Iterator[None]:
     """What an example enters in a registry is gone after it."""
@@ -73,6 +80,8 @@ def place(registries: None, tmp_path: Path) -> Iterator[Path]:
     (tmp_path / "cases" / "meshes").mkdir(parents=True)
     write_mesh(tmp_path / "cases" / "meshes" / "coarse.vtu", plate(9))
     with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(compute, "draw_run", lambda scene, folder, *_: blank(folder / "density.png"))
+        patch.setattr(compute, "draw_comparison", lambda one, other, folder: blank(folder / "comparison.png"))
         patch.chdir(tmp_path)
         patch.setattr(sample, "data_folder", lambda case: tmp_path / "cases")
         (deck,) = blocks("docs/first_crack.md", "toml")

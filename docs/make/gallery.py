@@ -9,8 +9,9 @@ ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
 HEAD = """# Examples
 
-Twelve short scripts. Each runs on one core in less than a minute (the first time compilation comes on top), and ends with a
-number that is known from elsewhere: a closed form, a symmetry, a theorem. They are in the folder `examples` of a clone:
+Twelve short scripts. Each runs on one core in less than a minute (the first time compilation comes on top), and ends
+with a number that is known from elsewhere: a closed form, a symmetry, a theorem. They are in the folder `examples` of a
+clone:
 
 ```bash
 python examples/rubber_sheet.py                  # leaves rubber_sheet.png and the folder results here
