@@ -1,9 +1,9 @@
 """A tube of media and adventitia under pressure.
 
 A tube as a body of revolution, held along its axis: the tissue of the paper inside, one twice as stiff outside. It is
-pressurised until the media has lost 1 % of its density, and no farther. The number: pressure and gained volume are
+pressurised until the media has lost 0.1 % of its density, and no farther. The number: pressure and gained volume are
 those of two thick rings of incompressible material (examples/ring_bursts.py), with the law of each layer in its part
-of the integral; eight elements through the wall and 1 % of the density leave less than 1 %.
+of the integral; eight elements through the wall leave less than 1 %.
 """
 
 import matplotlib.pyplot as plt
@@ -17,15 +17,16 @@ mesh.cell_sets = {"adventitia": [np.flatnonzero(mesh.points[mesh.cells_dict["qua
 sk.write_mesh("tube.vtu", mesh)
 tube = sk.custom(mesh="tube.vtu", title="A tube of two layers", element="axisymmetric", out="results/tube",
                  overwrite=True, grips=[{"boundary": "bottom", "y": 0}, {"boundary": "top", "y": 0}],
-                 pressures=[{"boundary": "left", "rate": "10 kPa/s"}], stop=lambda view: view.state.gamma.min() < 0.99,
+                 pressures=[{"boundary": "left", "rate": "10 kPa/s"}], stop=lambda view: view.state.gamma.min() < 0.999,
                  regions=[{"name": "adventitia", "material": "aaa", "constants": "c1 = 1.234, c2 = 2.43"}],
                  probes=[{"name": "wall", "kind": "line", "position": [1.001, 0.2], "to": [1.199, 0.2], "points": 41,
                           "quantity": "stress"}])
-pressure, c = tube.history["pressure_MPa"][-1], tube.history["swept_volume"][-1] / (np.pi * length)
+last = -2  # increment before the sink had begun
+pressure, c = tube.history["pressure_MPa"][last], tube.history["swept_volume"][last] / (np.pi * length)
 wall = tube.probes["wall"]
 figure, axes = plt.subplots(figsize=(5, 3), layout="constrained")
-axes.plot(1.001 + wall.look("s_mm")[-1], wall.look("stress_zz_MPa")[-1], "k")
-axes.set(xlabel="radius, undeformed (mm)", ylabel="hoop stress (MPa)", title=f"pressure {1e3 * pressure:.0f} kPa")
+axes.plot(1.001 + wall.look("s_mm")[last], wall.look("stress_zz_MPa")[last], "k")
+axes.set(xlabel="radius, undeformed (mm)", ylabel="hoop stress, means of elements (MPa)", title=f"pressure {1e3 * pressure:.0f} kPa")
 figure.savefig("artery_layers.png", dpi=120)
 
 R = np.linspace(1, 1.2, 2001)

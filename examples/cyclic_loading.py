@@ -1,35 +1,35 @@
-"""Cycles of loading, in which a crack grows.
+"""Cycles of loading, and then a crack.
 
-A strip with a cut is pulled to and fro, each time farther, fast enough for inertia (the event begins at load time 0).
-A point fails by the greatest energy it has seen, so there is no fatigue. The number: what the sink takes, D, never
-falls, and while the grips go back it grows by less than 10 % of all: the crack grows where it is pulled farther than
-before.
+The plate of the paper is pulled to 88 % of its onset and back, three times, and then until its crack has grown by 0.5
+mm. The number: a point fails by the greatest energy that it has seen, so cycles below that change nothing, and the onset
+is at the opening of a plate that is pulled once. The search for the onset ends within 0.05 % of the load; 0.2 % is
+allowed. So there is no fatigue in this theory.
 """
 
 import matplotlib.pyplot as plt
-import numpy as np
 
 import skfsink as sk
 
-sk.write_mesh("strip.vtu", sk.grid_mesh(np.linspace(0, 3, 61), np.linspace(0, 1, 21)))
-points = [[0, 0]]  # of each grip [s, mm]
-for i, peak in enumerate([0.024, 0.028, 0.032]):
-    points += [[(2 * i + 1) * 5e-5, peak], [(2 * i + 2) * 5e-5, 0]]
-strip = sk.custom(mesh="strip.vtu", title="Cycles", event_at=0.0, event_time="300 us", out="results/cycles",
-                  overwrite=True, grips=[{"boundary": "top", "y": points}, {"boundary": "right", "x": 0},
-                         {"boundary": "bottom", "y": [[t, -u] for t, u in points]}],
-                  cracks=[{"name": "cut", "points": [[0, 0.475], [1, 0.475]], "lips": "whole"}])
-event = strip.event
-t, D = event["time_s"] * 1e6, event["sink_stored"] + event["sink_kinetic"]
-figure, (axes, low) = plt.subplots(2, sharex=True, figsize=(5, 4), layout="constrained")
-axes.plot(t, event["grip_displacement_mm"], "k")
-axes.set_ylabel("opening (mm)")
-low.plot(t, event["crack_length_mm"], color="tab:red", label="crack (mm)")
-low.plot(t, D / D[-1], color="tab:blue", label="D over its last value")
-low.set_xlabel("time (µs)")
-low.legend()
+mesh = sk.data_folder("single_edge_notch") / "meshes" / "coarse.vtu"
+
+
+def pulled(cycles, out):
+    """The plate after so many cycles; each takes 2 s of load time, each grip moves by 0.055 mm."""
+    way = [[0, 0], *([t, 0.055 * (t % 2)] for t in range(1, 2 * cycles + 1)), [2 * cycles + 2, 0.11]]
+    return sk.custom(mesh=mesh, title="A plate after cycles", stop="crack_length > 0.5 mm", out=out, overwrite=True,
+                     grips=[{"boundary": "top", "x": 0, "y": way},
+                            {"boundary": "bottom", "x": 0, "y": [[t, -u] for t, u in way]}])
+
+
+once, thrice = pulled(0, "results/once"), pulled(3, "results/thrice")
+figure, (axes, crack) = plt.subplots(2, figsize=(5, 4.5), layout="constrained")
+loading = thrice.history["phase"] == "loading"
+axes.plot(thrice.history["time_s"][loading], thrice.history["reaction_N_per_mm"][loading], "k.-")
+axes.set(xlabel="load time (s)", ylabel="load (N/mm)")
+crack.plot(thrice.event["time_s"] * 1e6, thrice.event["crack_length_mm"], color="tab:red")
+crack.set(xlabel="time since the onset (µs)", ylabel="crack (mm)")
 figure.savefig("cyclic_loading.png", dpi=120)
-back = (np.floor(t / 50) % 2 == 1)[:-1]
-share = np.diff(D)[back].sum() / D[-1]
-print(f"crack of {event['crack_length_mm'][-1]:.2f} mm; {share:.1%} of D while the grips go back")
-assert (np.diff(D) >= -1e-9).all() and share < 0.1
+
+one, other = (run.summary["onset"]["displacement_mm"] for run in (once, thrice))
+print(f"onset at {one:.5f} mm, after three cycles at {other:.5f} mm")
+assert abs(other / one - 1) < 2e-3

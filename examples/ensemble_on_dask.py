@@ -22,8 +22,6 @@ DECK = """
 case = "single_edge_notch"
 
 [parameters]
-side = 2.0
-notch = 0.5
 model = "onset"
 """
 

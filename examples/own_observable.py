@@ -21,8 +21,8 @@ class Circles(sk.Observer):
         self.rows = []
 
     def loading(self, view):
-        X, R = view.body.space.X, np.hypot(*(view.body.space.X - 4.0).T)
-        r = np.hypot(*(X + view.state.u - 4.0).T)
+        X = view.body.space.X
+        R, r = np.hypot(*X.T), np.hypot(*(X + view.state.u).T)
         near = [R < 0.501, abs(R - 1.0) < 0.05]
         self.rows.append([float((r[some] / R[some]).mean()) for some in near] + [float(R[near[1]].mean())])
 
