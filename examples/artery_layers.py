@@ -26,7 +26,8 @@ pressure, c = tube.history["pressure_MPa"][last], tube.history["swept_volume"][l
 wall = tube.probes["wall"]
 figure, axes = plt.subplots(figsize=(5, 3), layout="constrained")
 axes.plot(1.001 + wall.look("s_mm")[last], wall.look("stress_zz_MPa")[last], "k")
-axes.set(xlabel="radius, undeformed (mm)", ylabel="hoop stress, means of elements (MPa)", title=f"pressure {1e3 * pressure:.0f} kPa")
+axes.set(xlabel="radius, undeformed (mm)", ylabel="hoop stress, means of elements (MPa)",
+         title=f"pressure {1e3 * pressure:.0f} kPa")
 figure.savefig("artery_layers.png", dpi=120)
 
 R = np.linspace(1, 1.2, 2001)

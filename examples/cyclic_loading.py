@@ -1,9 +1,9 @@
 """Cycles of loading, and then a crack.
 
 The plate of the paper is pulled to 88 % of its onset and back, three times, and then until its crack has grown by 0.5
-mm. The number: a point fails by the greatest energy that it has seen, so cycles below that change nothing, and the onset
-is at the opening of a plate that is pulled once. The search for the onset ends within 0.05 % of the load; 0.2 % is
-allowed. So there is no fatigue in this theory.
+mm. The number: a point fails by the greatest energy that it has seen, so cycles below that change nothing, and the
+onset is at the opening of a plate that is pulled once: there is no fatigue in this theory. Both onsets are searched for
+from other load increments, each to within 0.05 % of the load; 0.2 % is allowed.
 """
 
 import matplotlib.pyplot as plt

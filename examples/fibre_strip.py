@@ -2,7 +2,8 @@
 
 Adventitia with two families of fibres at 20 degrees to a direction that is inclined to the strip by 45 degrees, and
 then by -45. The number: both strips are mirror images of each other, and so must be the ways of their tears: the sum
-of the directions is 0. Rounding and single elements are allowed 5 degrees.
+of the directions is 0. Rounding and single elements are allowed 5 degrees. Rows of equal elements steer a tear, so the
+direction itself says less.
 """
 
 import numpy as np

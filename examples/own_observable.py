@@ -1,9 +1,9 @@
 """A quantity of one's own, and an end of one's own.
 
-A plate with a hole, pulled on four sides (docs/decks.md). An observer follows the stretch of the rim; the loading
-ends when it is 1.15, before anything softens. The number: an incompressible body in plane strain has no choice, r^2 =
-R^2 + c, so the stretch of a circle of 1 mm follows from that of the rim of 0.5 mm. The plate is compressible, by a
-bulk modulus of 400 shear moduli, and coarse: 10 % of what the circle is stretched by is allowed.
+A plate with a hole, pulled on four sides (docs/decks.md). An observer follows the stretch of the rim; the loading ends
+when it is 1.15, before much softens. The number: an incompressible body in plane strain has no choice, r^2 = R^2 + c,
+so the stretch of a circle of 1 mm follows from that of the rim of 0.5 mm. The plate is coarse, and the 400 shear moduli
+of its bulk modulus let it grow a little: 3 % of what the circle is stretched by is allowed.
 """
 
 import matplotlib.pyplot as plt
@@ -28,7 +28,9 @@ class Circles(sk.Observer):
 
 
 circles = Circles()
-sides = {"left": {"x": "-1 um/s"}, "bottom": {"y": "-1 um/s"}, "top": {"y": "1 um/s"}, "right": {"x": "1 um/s"}}
+out = [[i, 1e-3 * i] for i in range(21)]  # increments end at the points of a ramp
+back = [[t, -u] for t, u in out]
+sides = {"left": {"x": back}, "bottom": {"y": back}, "top": {"y": out}, "right": {"x": out}}
 plate = sk.custom(mesh=sk.data_folder("biaxial_hole") / "meshes" / "coarse.vtu", title="A plate with a hole",
                   grips=[{"boundary": name, **motion} for name, motion in sides.items()], observers=[circles],
                   stop=lambda view: circles.rows[-1][0] > 1.15, out="results/circles", overwrite=True)
@@ -41,4 +43,4 @@ axes.set(xlabel="stretch of the rim", ylabel="stretch of a circle of 1 mm")
 axes.legend()
 figure.savefig("own_observable.png", dpi=120)
 print(f"{circle[-1]:.4f}, closed form {closed[-1]:.4f}")
-assert abs((circle[-1] - 1) / (closed[-1] - 1) - 1) < 0.1
+assert abs((circle[-1] - 1) / (closed[-1] - 1) - 1) < 0.03

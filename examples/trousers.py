@@ -41,5 +41,5 @@ sheet.point_sets = {"upper": np.flatnonzero((x == 0) & (y > 0.55)), "lower": np.
 sk.write_mesh("sheet.vtu", sheet)
 (E, G, run), (E_longer, G_longer, _) = opened(2.0), opened(2.2)
 run.plot("trousers.png")
-print(f"-dE/(t da) = {(E - E_longer) / (T * 0.2):.5f} N/mm, domain integral {(G + G_longer) / 2:.5f} N/mm")
+print(f"-dE/(t da) = {1e3 * (E - E_longer) / (T * 0.2):.4f} J/m^2, domain integral {500 * (G + G_longer):.4f} J/m^2")
 assert abs((E - E_longer) / (T * 0.2) / ((G + G_longer) / 2) - 1) < 0.1

@@ -185,7 +185,7 @@ def test_every_block_runs(page: str, place: Path) -> None:
 def test_there_are_blocks() -> None:
     """Fails if blocks are not found any more, or what comes before or after one belongs to none."""
     assert {page: len(texts) for page, texts in programs().items()}.items() >= {
-        "docs/first_crack.md": 4, "docs/results.md": 1, "CONTRIBUTING.md": 8}.items()
+        "docs/first_crack.md": 4, "docs/results.md": 4, "CONTRIBUTING.md": 8}.items()
     texts = [text for page in programs().values() for text in page]
     assert all(any(words in text for text in texts) for words in (*BEFORE, *AFTER))
 
