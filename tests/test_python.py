@@ -111,6 +111,7 @@ def test_grids() -> None:
                           corners[:, 4] - corners[:, 0] if len(lines) == 3 else np.tile([0, 0, 1.0], (2, 1))], axis=1)
         assert np.linalg.det(sides).sum() == pytest.approx(np.prod([line[-1] - line[0] for line in lines]))
         assert (np.linalg.det(sides) > 0).all()
+        assert (corners[:, 0] + corners[:, 2] == corners[:, 1] + corners[:, 3]).all()  # in the order around
     assert sk.grid_mesh([0, 1], [0, 1], place=lambda X: 2 * X).points.max() == 2
     with pytest.raises(MeshError, match="two ascending coordinates y"):
         sk.grid_mesh([0, 1], [0, 0])
