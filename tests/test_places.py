@@ -20,8 +20,8 @@ from skfsink.fem.space import Space
 from skfsink.fields.state import State
 from skfsink.loads.grips import Grip, Ramp
 from skfsink.meshing.sample import Sample
-from skfsink.report.tables import key_table
 from skfsink.results.loader import load
+from skfsink.results.tables import key_table
 from skfsink.run.observers import places
 from skfsink.scene.scene import Scene
 from skfsink.sweep.table import read_rows

@@ -92,7 +92,7 @@ def test_parts_are_even_and_their_borders_short() -> None:
 
 
 def test_a_load_that_does_not_know_parts() -> None:
-    """Fails if a load of one's own is left out on several ranks, or refused after the body is loaded."""
+    """Fails if a load of your own is left out on several ranks, or refused after the body is loaded."""
     space = box("quad", 3)
     held = (np.flatnonzero(space.X[:, 1] == 0.0), Grip("bottom", (0.0, 0.0)))
     known = Loading(space, [held], others=[BodyForce(space, 1e-9, (0.0, 1.0))])

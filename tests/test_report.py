@@ -25,10 +25,10 @@ from skfsink.meshing.vtu import write_mesh
 from skfsink.pictures import plot
 from skfsink.report import charts, citation, report_page, write_report
 from skfsink.report.scenes import command_line, run_labels
-from skfsink.report.tables import energy_tables
 from skfsink.results import reference
 from skfsink.results.history import HISTORY_COLUMNS, OF_PRESSURES, History
 from skfsink.results.loader import ENERGIES, FIELD_UNITS
+from skfsink.results.tables import energy_tables
 from skfsink.system import shipped
 from skfsink.system.shipped import data_folder
 

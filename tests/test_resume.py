@@ -30,7 +30,8 @@ from skfsink.scene.deck import read_deck
 RUNS = {"explicit": [], "short": ["--event-time", "3e-5"], "quasistatic": ["--analysis", "quasistatic"],
         "consistent": ["--sink", "consistent", "--event-time", "4e-5"],
         "hht": ["--integrator", "hht", "--event-time", "3e-5"], "both": ["--analysis", "both", "--event-time", "2e-5"],
-        "contact": ["--contact", "--event-time", "4e-5"]}
+        "contact": ["--contact", "--event-time", "4e-5"],
+        "stopped": ["--analysis", "both", "--stop", "crack_length > 1 mm"]}
 
 
 def histories(folder: Path) -> dict[str, bytes]:

@@ -83,7 +83,7 @@ def test_fingerprint_tells_scenes_apart(mesh: Path, tmp_path: Path) -> None:
         balance_tolerance=0.1, threads=2, front=0.5, checkpoint_every=10.0, active_zone=False, start="rest",
         kernels="forms", energy_tolerance=1e-4, gradient="gauss", viscosity=1e-5,
         bulk_viscosity_linear=0.06, bulk_viscosity_quadratic=1.2, raised_mass=0.02, density_solver="jacobi",
-        linear="multigrid", fields="W", pictures="svg", series="vtkhdf").parameters().items()
+        linear="multigrid", fields="W", pictures="svg", series="vtkhdf", stop="arrival").parameters().items()
         if name not in (*of_named_meshes, "analysis", "start", "material", "constants", "contact", "debris")]
     others += [scene(mesh, material="gent"), scene(mesh, material="gent", constants="mu = 0.3")]
     others += [scene(mesh, analysis="quasistatic"), scene(mesh, start="rest"), scene(mesh, contact=True),

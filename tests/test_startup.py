@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import os
+import resource
 import shutil
 import subprocess
 import sys
@@ -58,6 +59,23 @@ def test_a_start_compiles_what_it_needs_and_a_second_one_nothing(tmp_path: Path)
     assert first >= 4
     assert not [name for name in names if "3d" in name or "plane_stress" in name], names
     assert start(tmp_path) == (0, names)
+
+
+def processor_time(*arguments: str) -> float:
+    """Least processor time that Python takes with these arguments [s]; of three, as other processes disturb caches."""
+    def once() -> float:
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        subprocess.run([sys.executable, *arguments], capture_output=True, check=True)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+    return min(once() for _ in range(3))
+
+
+def test_a_start_takes_no_time() -> None:
+    """Fails if `import skfsink` takes more than 0.1 s, or the help of the program 0.6 s, of the processor."""
+    assert processor_time("-c", "import skfsink") - processor_time("-c", "") < 0.1
+    assert processor_time("-m", "skfsink", "--help") < 0.6
 
 
 # --- what makes a compiled loop old ---

@@ -9,6 +9,7 @@ from ..loads.grips import Grip
 from ..meshing.shapes import check_two_notches
 from ..results.result import Result
 from ..run.compute import run_case
+from ..run.keywords import case_function
 from ..scene.arrange import arrange
 from ..scene.case import Case
 from ..scene.options import SAMPLE, Options
@@ -26,6 +27,7 @@ ASSUMED = (
 )
 
 
+@case_function
 def asymmetric_double_edge_notch(
         *,
         side: Annotated[float, SAMPLE, Unit("mm")] = 5.0,

@@ -18,6 +18,7 @@ from ..material.regions import Region, RegionLaw, by_element
 from ..meshing.sample import file_sample
 from ..results.result import Result
 from ..run.compute import run_case
+from ..run.keywords import case_function
 from ..run.request import check_options
 from ..scene.case import Case
 from ..scene.fibres import with_fibres
@@ -40,6 +41,7 @@ __all__ = ["custom"]
 IN_A_DECK = Parameter(parse=False)
 
 
+@case_function
 def custom(
         *,
         mesh: Annotated[str, SAMPLE] = "",

@@ -12,6 +12,7 @@ from ..meshing.sweeping import rolled, swept, unrolled
 from ..meshing.symmetry import Mirror
 from ..results.result import Result
 from ..run.compute import run_case
+from ..run.keywords import case_function
 from ..scene.arrange import arrange
 from ..scene.case import Case
 from ..scene.options import SAMPLE, Options
@@ -29,6 +30,7 @@ ASSUMED = (
 )
 
 
+@case_function
 def cylindrical_shell(
         *,
         inner_radius: Annotated[float, SAMPLE, Unit("mm")] = 1.9,

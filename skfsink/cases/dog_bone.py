@@ -14,6 +14,7 @@ from ..meshing.sweeping import swept
 from ..meshing.symmetry import Mirror
 from ..results.result import Result
 from ..run.compute import run_case
+from ..run.keywords import case_function
 from ..scene.arrange import arrange
 from ..scene.case import Case
 from ..scene.options import SAMPLE, Options
@@ -30,6 +31,7 @@ ASSUMED = (
 )
 
 
+@case_function
 def dog_bone(
         *,
         length: Annotated[float, SAMPLE, Unit("mm")] = 10.0,

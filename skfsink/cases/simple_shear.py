@@ -9,6 +9,7 @@ from ..loads.grips import Grip
 from ..meshing.shapes import check_plate
 from ..results.result import Result
 from ..run.compute import run_case
+from ..run.keywords import case_function
 from ..scene.arrange import arrange
 from ..scene.case import Case
 from ..scene.options import SAMPLE, Options
@@ -27,6 +28,7 @@ ASSUMED = (
 )
 
 
+@case_function
 def simple_shear(
         *,
         side: Annotated[float, SAMPLE, Unit("mm")] = 5.0,

@@ -9,6 +9,7 @@ from ..meshing.shapes import check_two_notches
 from ..meshing.symmetry import Mirror
 from ..results.result import Result
 from ..run.compute import run_case
+from ..run.keywords import case_function
 from ..scene.arrange import arrange
 from ..scene.case import Case
 from ..scene.options import SAMPLE, Options
@@ -27,6 +28,7 @@ ASSUMED = (
 )
 
 
+@case_function
 def symmetric_double_edge_notch(
         *,
         side: Annotated[float, SAMPLE, Unit("mm")] = 3.0,

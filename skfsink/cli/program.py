@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import os
 import signal
 import sys
@@ -33,7 +34,7 @@ def command(function: Callable[..., Any], arguments: list[str] | None = None, pa
 
     app = App(name=f"python -m skfsink.{package}.{function.__name__}", version=f"skfsink {__version__}", config=note,
               group_commands=Group.create_ordered("Help"))
-    app.default(function)
+    app.default(inspect.unwrap(function))  # a case takes `options` here, and no option as a keyword of its own
     run(app, arguments, given_names)
 
 

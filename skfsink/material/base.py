@@ -12,13 +12,19 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from scipy.optimize import brentq
 
 from ..errors import require
 from .compiled import CompiledLaw
+from .drawn import plot_paths
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from .sink import SinkLaw
 
 __all__ = ["Material"]
 
@@ -127,6 +133,27 @@ class Material:
             falls = dpsi * I * (4 / 3 * square - 2 / 3 * t) + self.bulk_modulus * J * (J - 1) < 0
             low, high = np.where(falls, log_J, low), np.where(falls, high, log_J)
         return np.asarray(np.exp(0.5 * (low + high)) / j)
+
+    def plot(self, sink_law: SinkLaw | None = None, path: str = "", ax: Axes | None = None) -> Axes:
+        """Draw stress against stretch of homogeneous deformations: with the sink full, without it dashed.
+
+        Parameters
+        ----------
+        sink_law: energy limiter and sharpness, as `materials.limiter("gent")` gives those of a law; None draws the
+            stored energy alone, up to a stretch of 2.
+        path: "uniaxial tension", "plane strain", "equibiaxial tension" or "simple shear"; left out: the tensions.
+        ax: axes of matplotlib to draw on; left out: those of a new figure of pyplot.
+
+        Returns
+        -------
+        The axes.
+
+        Raises
+        ------
+        ParameterError
+            There is no such path.
+        """
+        return plot_paths(self, sink_law, path, ax)
 
     @property
     def shear_modulus(self) -> float:

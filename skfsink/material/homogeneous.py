@@ -9,13 +9,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
-from . import GeneralMaterial, Material, SinkLaw
+from .sink import SinkLaw
 
-__all__ = ["PATHS", "Curve", "Path", "Peak", "curve", "extent", "peaks", "wave_speed_at_failure"]
+if TYPE_CHECKING:
+    from .base import Material
+
+__all__ = ["PATHS", "Curve", "Path", "Peak", "curve", "extent", "peak_of", "peaks", "wave_speed_at_failure"]
 
 
 def _diagonal(*stretches: np.ndarray) -> np.ndarray:
@@ -27,7 +31,8 @@ def _diagonal(*stretches: np.ndarray) -> np.ndarray:
 
 def _uniaxial(material: Material, s: np.ndarray) -> np.ndarray:
     """diag(s, b, 1/(s b)); b is s^(-1/2) without fibres, else found by bisection so that both sides are free."""
-    if not isinstance(material, GeneralMaterial) or not material.fibres(np.zeros((1, 3))).size:
+    fibres = getattr(material, "fibres", None)  # of a GeneralMaterial
+    if fibres is None or not fibres(np.zeros((1, 3))).size:
         return _diagonal(s, s**-0.5, s**-0.5)
     low, high = -2 * np.abs(np.log(s)), np.abs(np.log(s))
     for _ in range(60):
@@ -141,16 +146,18 @@ def wave_speed_at_failure(material: Material, law: SinkLaw) -> float:
 
 def peaks(material: Material, law: SinkLaw) -> dict[str, Peak]:
     """The strength on each of `PATHS`: uniaxial, plane-strain and equibiaxial tension, simple shear."""
-    found = {}
-    for name, path in PATHS.items():
-        at = np.linspace(path.start, extent(material, law, path), 500)
-        top = int(np.argmax(curve(material, law, path, at).stress))
+    return {name: peak_of(material, law, path) for name, path in PATHS.items()}
 
-        def weakness(s: float, path: Path = path) -> float:
-            return -float(curve(material, law, path, [s]).stress[0])
 
-        bounds = at[top - 1], at[min(top + 1, len(at) - 1)]
-        best = minimize_scalar(weakness, bounds=bounds, method="bounded", options={"xatol": 1e-10})
-        there = curve(material, law, path, [best.x])
-        found[name] = Peak(float(best.x), float(there.stress[0]), float(there.W[0]), float(there.gamma[0]))
-    return found
+def peak_of(material: Material, law: SinkLaw, path: Path) -> Peak:
+    """The strength on one path."""
+    at = np.linspace(path.start, extent(material, law, path), 500)
+    top = int(np.argmax(curve(material, law, path, at).stress))
+
+    def weakness(s: float) -> float:
+        return -float(curve(material, law, path, [s]).stress[0])
+
+    bounds = at[top - 1], at[min(top + 1, len(at) - 1)]
+    best = minimize_scalar(weakness, bounds=bounds, method="bounded", options={"xatol": 1e-10})
+    there = curve(material, law, path, [best.x])
+    return Peak(float(best.x), float(there.stress[0]), float(there.W[0]), float(there.gamma[0]))

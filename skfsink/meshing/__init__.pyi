@@ -1,4 +1,5 @@
 from .gmsh_model import has_gmsh as has_gmsh
+from .grid import grid_mesh as grid_mesh
 from .outline import Edge as Edge
 from .outline import SizeField as SizeField
 from .outline import completed as completed

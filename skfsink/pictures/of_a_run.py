@@ -8,15 +8,18 @@ from pathlib import Path
 
 import numpy as np
 
+from ..errors import OutputError
 from ..fields.frame_fields import asked_fields
 from ..results.fragments import FRAGMENTS, read_fragments
 from ..results.frame import Frame
 from ..results.history import History, Table
+from ..results.loader import Run, load
 from ..results.loading import way_to_onset
 from ..results.probes import read_probes
 from ..results.result import Result
 from ..results.stored_series import StoredSeries
 from ..scene.scene import Scene
+from ..system.files import path_of
 from .fibre_picture import fibre_picture
 from .field_picture import field_picture
 from .looks import cells_of
@@ -25,10 +28,11 @@ from .piece_picture import piece_picture
 from .plot import comparison_picture, density_picture, ledger_picture, loading_picture, tip_picture
 from .probe_curves import probe_picture
 
-__all__ = ["draw_comparison", "draw_run", "draw_what_there_is"]
+__all__ = ["draw_comparison", "draw_run", "draw_what_there_is", "picture"]
 
 WORDS = {"onset": "onset", "branching": "first branches", "arrival": "first arrival", "end": "end"}
 LATEST = "last frame"
+FORMATS = (".pdf", ".svg", ".png")  # of pictures that are drawn again
 
 
 def draw_run(scene: Scene, folder: Path, series: str, moments: Mapping[str, int]) -> None:
@@ -157,12 +161,56 @@ def _draw_pieces(run: _Files, frame: Frame) -> None:
     piece_picture(scene.space, frame, last, density, run.path("fragments"), run.title, scene.view)
 
 
+def picture(run: Run | str | Path, path: str | Path, title: str | None = None) -> Path:
+    """Draw the main picture of a run again, as for a paper: γ on the deformed body at the key moments, or of
+    `analysis="both"` both analyses with their energies.
+
+    Parameters
+    ----------
+    run: a run or its folder.
+    path: of the picture; its suffix is the format: ".pdf", ".svg", ".png".
+    title: above it; left out: that of the run, "" for none.
+
+    Returns
+    -------
+    The path.
+
+    Raises
+    ------
+    OutputError
+        The folder holds no finished run, or the format is unknown.
+    """
+    run, path = run if isinstance(run, Run) else load(run), path_of("path", path)
+    if not all(part.finished for part in run.runs):
+        raise OutputError(f"the run in {run.folder} is not finished: there is no picture to draw")
+    if path.suffix.lower() not in FORMATS:
+        raise OutputError(f"a picture is drawn as {', '.join(FORMATS)}; got {path.name}")
+    scene = run.scene
+    name = f"{scene.title}, mesh {scene.sample.name}" if title is None else title
+    if run.parts and all(part.summary["series"] == "run" for part in run.runs):
+        _comparison(scene, run.parts["dynamic"], run.parts["quasistatic"], path, name)
+    else:
+        _density(scene, run.runs[0], path, name)
+    return path
+
+
+def _density(scene: Scene, run: Run, path: Path, title: str) -> None:
+    files = _Files(scene, run.folder, title, run.frames.name, run.frames.moments)
+    numbers = sorted(set(files.moments.values())) or [len(files.stored) - 1]
+    density_picture(scene.space, files.frames(numbers), path, title, scene.view)
+
+
 def draw_comparison(dynamic: Result, quasistatic: Result, folder: Path) -> None:
     """`comparison`: the dynamic crack beside the quasi-static one, at the end of each."""
-    frames, scene = [], dynamic.scene
+    scene = dynamic.scene
+    _comparison(scene, dynamic, quasistatic, folder / f"comparison.{scene.controls.pictures}",
+                f"{scene.title}, mesh {scene.sample.name}")
+
+
+def _comparison(scene: Scene, dynamic: Run, quasistatic: Run, path: Path, title: str) -> None:
+    frames, space = [], scene.sample.space
     for part in (dynamic, quasistatic):
         number = part.summary["moments"].get("arrival", part.summary["moments"]["end"])
-        frames.append(StoredSeries.of(part.folder / "series", "run").frame(number, np.nan, "", scene.space.dim))
-    comparison_picture(scene.space, frames[0], frames[1], dynamic.history, quasistatic.history,
-                       folder / f"comparison.{scene.controls.pictures}",
-                       title=f"{scene.title}, mesh {scene.sample.name}", view=scene.view)
+        frames.append(StoredSeries.of(part.folder / "series", "run").frame(number, np.nan, "", space.dim))
+    comparison_picture(space, frames[0], frames[1], dynamic.history, quasistatic.history, path, title=title,
+                       view=scene.view)

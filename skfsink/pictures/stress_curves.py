@@ -5,12 +5,11 @@ from __future__ import annotations
 from pathlib import Path as File
 
 import matplotlib
-import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..material import Material, SinkLaw
-from ..material.homogeneous import PATHS, Path, Peak, curve, extent
+from ..material.drawn import draw_path
+from ..material.homogeneous import PATHS, Peak, extent
 from ..system.files import replaced
 from .plot import BLUE, DPI, RED, STYLE, WIDTH
 
@@ -26,7 +25,7 @@ def stress_picture(material: Material, law: SinkLaw, strengths: dict[str, Peak],
     figure = Figure((WIDTH, 3.5), layout="constrained")
     ax, side = figure.subplots(1, 2, width_ratios=[3, 2])
     for name, way in PATHS.items():
-        _draw(side if way.free is None else ax, material, law, name, way, strengths[name])
+        draw_path(side if way.free is None else ax, material, law, name, COLOURS[name], strengths[name])
     for panel, symbol, stress, letter in (
             (ax, r"stretch $\lambda$", r"Cauchy stress $\sigma$ (MPa)", "(a) tension"),
             (side, "amount of shear $k$", r"Cauchy shear stress $\tau$ (MPa)", "(b) simple shear")):
@@ -41,14 +40,3 @@ def stress_picture(material: Material, law: SinkLaw, strengths: dict[str, Peak],
     kind = File(path).suffix.lstrip(".") or "png"
     with replaced(path) as part:
         figure.savefig(part, format=kind, dpi=DPI, metadata={"CreationDate": None} if kind == "pdf" else None)
-
-
-def _draw(ax: Axes, material: Material, law: SinkLaw, name: str, way: Path, peak: Peak) -> None:
-    end = way.start + 1.15 * (extent(material, law, way) - way.start)
-    found = curve(material, law, way, np.linspace(way.start, end, 700))
-    colour = COLOURS[name]
-    ax.plot(found.at, found.elastic, "--", color=colour, linewidth=0.9)
-    left = found.gamma > 1e-4
-    ax.plot(found.at[left], found.stress[left], color=colour,
-            label=f"{name}: {peak.stress:#.4g} MPa at ${way.symbol}$ = {peak.at:.3f}")
-    ax.plot([peak.at], [peak.stress], "o", color=colour, markersize=4)

@@ -13,12 +13,12 @@ from markupsafe import Markup
 
 from ..errors import OutputError
 from ..results.loader import Run, load
+from ..results.tables import EMPTY, Row, Table, cost_table, energy_tables, key_table, version_table
 from ..system.files import reported, write_atomic
 from ..system.version import __version__
 from . import charts
 from .citation import bibtex, citations
-from .scenes import command_line, differences, kind, named, parameter_table, run_labels, wave_speeds
-from .tables import EMPTY, Row, Table, cost_table, energy_tables, key_table, version_table
+from .scenes import command_line, differences, kind, parameter_table, run_labels, wave_speeds
 
 __all__ = ["environment", "report_page", "write_report"]
 
@@ -137,7 +137,7 @@ def environment(*packages: str) -> Environment:
 
 
 def _title(asked: Sequence[Run]) -> str:
-    names = list(dict.fromkeys(named(run) for run in asked))
+    names = list(dict.fromkeys(run.title for run in asked))
     if len(asked) > 1:
         return f"{len(asked)} runs compared: {', '.join(names)}"
     run = asked[0]
@@ -149,7 +149,7 @@ def _part(run: Run, label: str, several: bool) -> Part:
     pictures = {title: _picture(run.folder / name, title, lead + alt) for name, title, alt in PICTURES}
     choice = run.summary.get("model") or run.model_choice
     rows = tuple(Row(name.replace("_", " "), "", (_flat(value),)) for name, value in choice.items() if name != "text")
-    return Part(label, f"{named(run)}, mesh {run.parameters.get('mesh', EMPTY)}, {kind(run)}",
+    return Part(label, f"{run.title}, mesh {run.parameters.get('mesh', EMPTY)}, {kind(run)}",
                 _note(run), {title: picture for title, picture in pictures.items() if picture}, tuple(run.warnings),
                 run.assumed, rows, str(choice.get("text", "")), parameter_table(run), command_line(run), run.finished,
                 run.verdict)

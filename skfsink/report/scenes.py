@@ -9,13 +9,13 @@ from typing import Any
 
 from ..errors import SkfsinkError
 from ..results.loader import Run
+from ..results.tables import EMPTY, Row, Table
 from ..scene.case import CaseParameter, shared_parameters
 from ..scene.options import Options
 from ..scene.registry import CASES, find_case
 from ..scene.stored import SCENE, TABLES
-from .tables import EMPTY, Row, Table
 
-__all__ = ["command_line", "differences", "kind", "meanings", "named", "parameter_table", "path_labels", "run_labels",
+__all__ = ["command_line", "differences", "kind", "meanings", "parameter_table", "path_labels", "run_labels",
            "wave_speeds"]
 
 _LABELS = {"dynamic": "dynamic", "quasistatic": "quasi-static"}
@@ -99,11 +99,6 @@ def path_labels(folders: Sequence[Path]) -> list[str]:
         if len(set(labels)) == len(labels):
             return labels
     return [f"{label} ({i + 1})" for i, label in enumerate(labels)]
-
-
-def named(run: Run) -> str:
-    """The case, or the title of a scene of one's own."""
-    return str(run.parameters.get("title") or run.case.replace("_", " "))
 
 
 def kind(run: Run) -> str:

@@ -20,9 +20,11 @@ import numpy as np
 from ..errors import OutputError
 from ..scene.stored import SCENE, StoredScene
 from ..system.files import reported
+from .energies import ENERGIES, Energy
 from .fragments import FRAGMENTS, read_fragments
 from .history import History, Table, deletions_header
 from .probes import ProbeTable, read_probes
+from .shown import Shown
 from .stored_series import StoredSeries
 from .summary import SUMMARY, read_summary
 
@@ -36,33 +38,6 @@ log = logging.getLogger(__name__)
 FIELD_UNITS = {"displacement": "mm", "velocity": "mm/s", "gamma": "1", "deleted": "1", "W": "MPa", "gamma_element": "1",
                "stress": "MPa", "pressure": "MPa", "von_mises": "MPa", "principal_stress": "MPa",
                "stretch": "1", "crushed": "1", "region": "1", "fibre_1": "1", "fibre_2": "1"}
-#: Rows of :attr:`Run.energies`: name, columns of the history that add up to it, meaning.
-ENERGIES: tuple[tuple[str, tuple[str, ...], str], ...] = (
-    ("elastic", ("elastic",), "elastic energy, γ-weighted"),
-    ("kinetic", ("kinetic",), "kinetic energy, γ-weighted"),
-    ("contact", ("contact",), "of the lips of cracks that bear on each other"),
-    ("D", ("sink_stored", "sink_kinetic"), "D, taken by the sink"),
-    ("D_stored", ("sink_stored",), "of D: from stored energy"),
-    ("D_kinetic", ("sink_kinetic",), "of D: from motion"),
-    ("deletion", ("deletion",), "left in deleted elements"),
-    ("numerical", ("numerical",), "dissipated by the time integration"),
-    ("viscous", ("viscous",), "dissipated by viscosity"),
-    ("released", ("released",), "released in relaxing to equilibrium"),
-    ("work", ("work",), "work of the grips and of pressures during the event"),
-    ("pressure_work", ("pressure_work",), "of the work: of pressures"),
-    ("balance", ("balance",), "balance: what does not add up"),
-    ("U", ("U_paper",), "U of the paper, Σ A ψ_f of failed elements"),
-)
-
-
-class Energy(NamedTuple):
-    """An energy at the start of the event, at the first arrival of the crack (None without) and at the end."""
-
-    meaning: str
-    unit: str
-    start: float
-    arrival: float | None
-    end: float
 
 
 class Deletions(NamedTuple):
@@ -123,8 +98,8 @@ class Frames(Sequence[meshio.Mesh]):
         return mesh
 
 
-@dataclass(frozen=True, eq=False)
-class Run:
+@dataclass(frozen=True, eq=False, repr=False)
+class Run(Shown):
     """The results in a folder.
 
     Attributes
@@ -143,7 +118,7 @@ class Run:
     parameters: dict[str, Any]
     assumed: tuple[str, ...]
     model_choice: dict[str, Any]
-    parts: dict[str, Run]
+    parts: Mapping[str, Run]
     made_in_python: tuple[str, ...] = ()
 
     @property

@@ -49,7 +49,7 @@ from .summarize import summarize
 from .told import told
 from .two_pass import corridor_report, lay_corridor
 
-__all__ = ["run", "run_case"]
+__all__ = ["run", "run_case", "run_scene"]
 
 log = logging.getLogger(__name__)
 SUMMARY = "summary.json"
@@ -88,6 +88,9 @@ def run(scene: Scene, folder: str | Path, observers: Sequence[Observer] = (), *,
         return _compute(scene, _Job(path, display, resume, users, made_in_python=parts), overwrite)
 
 
+run_scene = run  # its name in `skfsink`, where `run` is the package
+
+
 def run_case(case: Case, arguments: dict[str, Any], options: Options) -> Result:
     """Run a case with the arguments of its function (all but `options`, with a `mesh` among them) and the options.
 
@@ -104,6 +107,7 @@ def run_case(case: Case, arguments: dict[str, Any], options: Options) -> Result:
             if request.model_choice:
                 display.say(request.model_choice["text"])
             job = _Job(request.folder, display, request.resumes, options.observers, request.notes,
+                       made_in_python=request.made_in_python,
                        ranks=RankOptions(options.partition, options.frame_pieces))
             return _compute(request.scene(), job, request.options.overwrite, partial(_with_corridor, request))
     except (Interrupted, KeyboardInterrupt):
@@ -113,8 +117,10 @@ def run_case(case: Case, arguments: dict[str, Any], options: Options) -> Result:
 
 def _how_to_go_on(request: RunRequest) -> str:
     folder = str(request.folder)
-    if request.options.observers:  # the command line has none
-        return f"go on from Python with resume={folder!r} and the same observers"
+    python = [*(["the same observers"] if request.options.observers else []),
+              *(["the same stop"] if request.made_in_python else [])]
+    if python:  # the command line has none
+        return f"go on from Python with resume={folder!r} and {' and '.join(python)}"
     return f"go on with skfsink resume {shlex.quote(folder)}"
 
 
@@ -122,7 +128,8 @@ def _how_to_go_on(request: RunRequest) -> str:
 class _Job:
     """Where a run goes, whether it goes on, who looks at it, and what it has to warn of at its beginning.
 
-    `made_in_python` are the parts of its scene that are not as the case makes them; a case function leaves none.
+    `made_in_python` are the parts of its scene that are not as the case makes them; a case function leaves none but
+    `stop`, where that is a function.
     """
 
     folder: Path

@@ -45,6 +45,11 @@ class RunRequest:
         return self.options.resume is not None
 
     @property
+    def made_in_python(self) -> tuple[str, ...]:
+        """What of it stands in no file."""
+        return ("stop",) if callable(self.options.stop) else ()
+
+    @property
     def folder(self) -> Path:
         """Folder of the run: the one that was named, or one named after case, mesh and analysis."""
         options, mesh = self.options, mesh_name(self.arguments["mesh"])
@@ -115,10 +120,10 @@ def _resumed(asked: RunRequest, folder: Path) -> RunRequest:
         raise ParameterError(f"--model {options.model} is not that of the run in {folder} "
                              f"({stored.model_choice.get('model')}); a resumed run keeps its scene")
     check_version(folder)
-    if stored.made_in_python:
+    if parts := {*stored.made_in_python} - {*asked.made_in_python}:
         raise OutputError(f"{folder / SCENE} does not describe its run, parts of which were made in Python "
-                          f"({', '.join(stored.made_in_python)}): resume it from there, with run(scene, folder, "
-                          f"resume=True)")
+                          f"({', '.join(stored.made_in_python)}): resume it from there, with "
+                          + ("stop=FUNCTION, the same" if parts == {"stop"} else "run(scene, folder, resume=True)"))
     _check_agreement(asked, stored, folder)
     try:
         arguments, values = case.from_stored(stored, folder)
@@ -126,6 +131,8 @@ def _resumed(asked: RunRequest, folder: Path) -> RunRequest:
             raise KeyError(*sorted(others))
     except KeyError as error:
         raise OutputError(f"{folder / SCENE} is not the scene of a run: parameter {error}") from None
+    if callable(options.stop):  # the fingerprint says whether it is that of the run
+        values["stop"] = options.stop
     options = replace(options, **values, corridor=corridor_mesh(folder),
                       kept_mesh=kept_mesh(folder, arguments["mesh"]))
     return RunRequest(case, arguments, options, stored.model_choice)

@@ -39,6 +39,7 @@ from .observers.probe_surfaces import probes_of
 from .observers.progress import Checkpoint, Progress
 from .observers.range import check_scene
 from .observers.view import View
+from .stop import Stop
 
 __all__ = ["Loaded", "Simulation", "standard_observers"]
 
@@ -55,8 +56,8 @@ class Loaded(NamedTuple):
 class Simulation:
     """One run of a scene in a folder, resumable at any moment.
 
-    Memory: the whole run: `run` goes on from where it is; `unfailed`, `dissolved`, `cost` and `checkpoint` are of the
-    run so far.
+    Memory: the whole run: `run` goes on from where it is; `unfailed`, `dissolved`, `ended`, `cost` and `checkpoint` are
+    of the run so far.
 
     Parameters
     ----------
@@ -73,6 +74,10 @@ class Simulation:
         The checkpoint to resume from is missing, damaged, or of another scene, version, or other observers.
     ParameterError
         The observers cannot be those of a run; see :class:`.Observers`.
+
+    Attributes
+    ----------
+    ended: why it ended before its time, as :class:`.Stop` says it; empty where it did not.
     """
 
     PATIENCE = 400.0  # a body that comes from rest in motion may take this many times `event_time` to crack
@@ -95,7 +100,8 @@ class Simulation:
         self.statics.until = scene.event_at
         self.notes = Notes(display.say, memory.get("warnings", ()))
         self.state = stored.state if stored else self.body.begin(State.intact(self.body.space))
-        self.costs = Cost(memory.get("cost"))
+        self.costs, self.ended = Cost(memory.get("cost")), str(memory.get("ended", ""))
+        self._stop = Stop(scene)
         self.integrator: Integrator | None = None
         self._from_rest: LoadingFromRest | None = None
         tracker = tracker_of(scene, self.body)
@@ -178,8 +184,11 @@ class Simulation:
         for _ in loading.load(state):
             view.increment = loading.increment
             self.observers.loading(view.at(state, self.momentum.force(state.u), way=self.statics.clock.way(state.grip)))
+            if loading is self.statics and (ended := self._stop(view)):
+                self.ended = self.statics.unfailed = ended
+                break
             self.observers.pause(view)
-        if state.grip >= self.scene.event_at:  # whether anything moved up to there or not
+        if state.grip >= self.scene.event_at and not self.ended:  # whether anything moved up to there or not
             self.statics.unfailed = ""
         self.costs.lap("loading")
 
@@ -207,6 +216,7 @@ class Simulation:
                 self.costs.factorisations += self.integrator.factorisations
             self._make_integrator().begin(state)
         self.observers.begin(self.view.at(state, reaction, "begin"))
+        self.ended = self._stop(self.view)
         self.display.say(f"the event begins at load time {state.grip:.4g} s" if self.view.on_time else
                          onset_text(self.onset.figures))
 
@@ -226,14 +236,15 @@ class Simulation:
         view.end = event_time
         if self.scene.controls.start == "rest":  # the instability has yet to grow: the clock is that of the crack
             view.end, cracked = self.PATIENCE * event_time, float(tracker.cracked_at.min())
-        for _ in integrator.run(state, view.end):
+        for _ in integrator.run(state, view.end) if not self.ended else ():
             self.costs.steps += 1
             self.observers.step(view.at(state, lambda: integrator.reaction, "step", dt=integrator.dt))
+            self.ended = self._stop(view)
             if tracker.separated and state.time >= self.crack.separated_at + self.scene.controls.aftermath:
                 break
             if cracked == np.inf and view.tips.branches:
                 cracked = float(tracker.cracked_at.min())
-            if self.dissolved or state.time >= cracked + event_time:
+            if self.ended or self.dissolved or state.time >= cracked + event_time:
                 break
             self.observers.pause(view)
         integrator.sync(state)
@@ -243,11 +254,12 @@ class Simulation:
         state, view, tracker = self.state, self.view, self.crack.tracker
         spent = self.SPENT * self.onset.figures["elastic_energy"]
         try:
-            for _ in self.statics.propagate(state):
+            for _ in self.statics.propagate(state) if not self.ended else ():
                 self.costs.steps += 1
                 self.observers.step(view.at(state, self.momentum.force(state.u), "step"))
+                self.ended = self._stop(view)
                 at_rest = self.statics.settled or state.ledger.elastic < spent
-                if self.dissolved or (tracker.separated and at_rest):
+                if self.ended or self.dissolved or (tracker.separated and at_rest):
                     break
                 self.observers.pause(view)
         except ConvergenceError as error:
@@ -283,7 +295,7 @@ class Simulation:
             self.integrator.sync(self.state)
             memories["integrator"] = self.integrator.memory()
         memories |= {f"observer {name}": memory for name, memory in self.observers.memories().items()}
-        memories["run"] = {"cost": self.cost(), "warnings": self.notes.kept}
+        memories["run"] = {"cost": self.cost(), "warnings": self.notes.kept, "ended": self.ended}
         save_checkpoint(self.folder / self.CHECKPOINT, self.scene.fingerprint, self.state, memories)
 
     def _restore(self, memories: dict[str, dict[str, Any]]) -> None:

@@ -20,7 +20,7 @@ from .observers.fragments import fragment_summary
 from .observers.places import greatest_ratio
 from .quantities import measured
 from .simulate import Simulation
-from .verdict import verdict
+from .verdict import ending, verdict
 
 __all__ = ["SCHEMA", "summarize"]
 
@@ -43,6 +43,7 @@ def summarize(scene: Scene, simulation: Simulation) -> dict[str, Any]:
     return {
         "schema": SCHEMA, "case": scene.case, "mesh": scene.sample.name, "analysis": scene.controls.analysis,
         "integrator": scene.controls.integrator if dynamic else None, "verdict": verdict(scene, simulation),
+        "end": ending(scene, simulation),
         "elements": space.n_elements, "dofs": int(simulation.free.sum()) + space.n_nodes,
         "unknowns": {"displacement": int(simulation.free.sum()), "density": space.n_nodes},
         "units": {"load": units["reaction_N_per_mm"], "energy": units["elastic"]},

@@ -78,7 +78,7 @@ def first_pass(scene: Scene, folder: Path, display: Display) -> tuple[np.ndarray
         Nothing failed.
     """
     prepare_folder(folder, overwrite=True)
-    controls = replace(scene.controls, start="onset",
+    controls = replace(scene.controls, start="onset", stop="",
                        analysis="dynamic" if scene.controls.analysis == "both" else scene.controls.analysis)
     simulation = Simulation(replace(scene, controls=controls), folder, display)
     space = scene.sample.space

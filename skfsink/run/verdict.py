@@ -26,6 +26,9 @@ def verdict(scene: Scene, simulation: Simulation) -> str:
     if simulation.dissolved:
         return f"failed everywhere at once, {_when(scene, state.time)}: no place of it was weaker than another"
     cracked = np.isfinite(tracker.cracked_at)
+    if simulation.ended:
+        where = f"the leading tip is at {_tip(scene, simulation)}" if cracked.any() else "nothing has cracked yet"
+        return f"ended {_when(scene, state.time)}, because {simulation.ended}; {where}"
     even = simulation.guard.even
     quasistatic = scene.controls.analysis == "quasistatic"
     model = str(scene.model_choice.get("model", ""))
@@ -39,14 +42,32 @@ def verdict(scene: Scene, simulation: Simulation) -> str:
     if tracker.separated:
         first = "" if tracker.arrival is None else f", arrived first {_when(scene, tracker.arrival)}"
         return f"cracked and separated{first}; apart {_when(scene, simulation.crack.separated_at)}"
-    last = simulation.history.rows[-1]
-    tip = f"{place_text(last[f'tip_{x}_mm'] for x in 'xyz'[:scene.sample.space.dim])} mm"
+    tip = _tip(scene, simulation)
     arrived = "" if tracker.arrival is None else f" after it had arrived {_when(scene, tracker.arrival)}"
     if quasistatic and simulation.statics.arrested:
         return f"arrested at {tip}{arrived}: {simulation.statics.arrested}"
-    if last["tips"]:
+    if simulation.history.rows[-1]["tips"]:
         return f"the crack was still running at event_time = {event:g} s: its tip is at {tip}"
     return f"arrested at {tip}{arrived}: no tip has moved for 5 l/c_s at the end of the event"
+
+
+def _tip(scene: Scene, simulation: Simulation) -> str:
+    """Where the leading tip is."""
+    last = simulation.history.rows[-1]
+    return f"{place_text(last[f'tip_{x}_mm'] for x in 'xyz'[:scene.sample.space.dim])} mm"
+
+
+def ending(scene: Scene, simulation: Simulation) -> str:
+    """Why a finished run has ended, to follow \"because\"."""
+    if simulation.ended or simulation.unfailed:
+        return simulation.ended or simulation.unfailed
+    if simulation.dissolved:
+        return "the body failed everywhere at once"
+    if simulation.crack.tracker.separated:
+        return "the sample came apart"
+    if scene.controls.analysis == "quasistatic":
+        return simulation.statics.arrested or "the passes changed nothing any more"
+    return f"event_time = {scene.controls.event_time:g} s was over"
 
 
 def _when(scene: Scene, clock: float) -> str:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numba
 
@@ -15,6 +17,7 @@ from ..fields.frame_fields import asked_fields
 from ..fields.sinks import SINKS
 from ..methods.controls import ExplicitControls, HHTControls, StaticsControls
 from ..methods.integrators import INTEGRATORS
+from .stop import NEVER, read_stop
 
 __all__ = ["ANALYSES", "PICTURES", "SERIES", "STARTS", "Controls"]
 
@@ -52,6 +55,7 @@ class Controls:
     active_zone: explicit steps solve for gamma only where it changes (see :mod:`.active_zone`).
     contact: the lips of cracks bear on each other (see :mod:`.contact`), in events and quasi-static passes.
     kernels: "compiled", or "forms" (scikit-fem forms, for small meshes), or another name in :data:`.BACKENDS`.
+    stop: what ends the run before its time: conditions as :mod:`.stop` has them, or a function of the view of the run.
     bulk_viscosity_linear, bulk_viscosity_quadratic: coefficients b1 and b2 of the bulk viscosity, [0, 10].
     fields: what is drawn besides the density, names of :data:`.frame_fields.DRAWN` with commas.
     pictures: "png", "pdf" or "svg".
@@ -78,6 +82,7 @@ class Controls:
     active_zone: bool = True
     contact: bool = False
     kernels: str = "compiled"
+    stop: str | Callable[..., Any] = ""
     bulk_viscosity_linear: float = 0.0
     bulk_viscosity_quadratic: float = 0.0
     fields: str = ""
@@ -91,6 +96,7 @@ class Controls:
         choose("analysis", self.analysis, ANALYSES)
         choose("integrator", self.integrator, INTEGRATORS)
         choose("start", self.start, STARTS)
+        self._check_stop()
         if self.start == "rest" and self.analysis != "dynamic":
             raise ParameterError(f"start rest is for analysis dynamic; got {self.analysis}")
         if self.contact and self.element in (why := {
@@ -120,6 +126,14 @@ class Controls:
             if require(name, getattr(self, name), low=0, high=10) and ELEMENTS[self.element].thin_sheet:
                 raise ParameterError(f"{name} is for elements whose volume changes; element {self.element} is a sheet "
                                      f"that thins freely: take viscosity; got {getattr(self, name)!r}")
+
+    def _check_stop(self) -> None:
+        """Refuse a condition that never holds in this analysis (ParameterError)."""
+        conditions = read_stop(self.stop)
+        for condition in conditions if isinstance(conditions, tuple) else ():
+            if condition.name == NEVER.get(self.analysis):
+                raise ParameterError(f"stop: {condition.name} is for the other analysis; got '{condition}', with "
+                                     f"analysis {self.analysis}")
 
     def workers(self, dim: int) -> int:
         """Number of threads to use for a body of that dimension, >= 1."""

@@ -42,5 +42,6 @@ def _parts(scene: Scene) -> dict[str, Any]:
     """What of a scene decides results, by the name of the part."""
     sample = scene.sample
     return {**{name.replace("_", " "): getattr(scene, name) for name in PARTS},
-            "controls": replace(scene.controls, checkpoint_every=Controls.checkpoint_every),
+            "controls": replace(scene.controls, checkpoint_every=Controls.checkpoint_every, stop=Controls.stop),
+            "stop": scene.controls.stop,
             "sample": [sample.space.X, sample.space.conn, sample.boundaries]}

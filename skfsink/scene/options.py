@@ -56,6 +56,7 @@ SAMPLE, MODEL, MATERIAL, SINK, LOADING, ANALYSIS, EXPLICIT, HHT, CONTROLS = map(
     "Sample", "Model", "Material", "Sink", "Loading", "Analysis", "Explicit integrator", "HHT integrator", "Controls"))
 OUTPUT = Parameter(group=Group.create_ordered("Output"))
 MODEL_FLAG = Parameter(group=MODEL.group)
+STOP = Parameter(group=ANALYSIS.group, show_default=False)
 CONTACT = Parameter(group=ANALYSIS.group, negative="", show_default=False)
 FLAG = Parameter(negative="", show_default=False)
 
@@ -147,6 +148,10 @@ class Options:
         Quadratic coefficient b2 of the bulk viscosity, for elements that are compressed, in [0, 10]; typical 1.2.
     event_time
         Longest dynamic event [s], > 0.
+    stop
+        What ends the run before its time: arrival, branching, separated, or a limit, "crack_length > 2 mm",
+        "displacement > 0.2 mm", "time > 50 us", "passes > 100"; of several with commas the first. From Python also a
+        function of the view of the run (:class:`skfsink.run.View`).
     aftermath
         Time for which the event goes on after the sample has come apart [s], >= 0.
     courant
@@ -245,6 +250,7 @@ class Options:
     bulk_viscosity_linear: Annotated[float, ANALYSIS] = Controls.bulk_viscosity_linear
     bulk_viscosity_quadratic: Annotated[float, ANALYSIS] = Controls.bulk_viscosity_quadratic
     event_time: Annotated[float, ANALYSIS, Unit("s")] = Controls.event_time
+    stop: Annotated[str, STOP] = ""
     aftermath: Annotated[float, ANALYSIS, Unit("s")] = Controls.aftermath
     courant: Annotated[float, EXPLICIT] = ExplicitControls.courant
     gamma_every: Annotated[int, EXPLICIT] = ExplicitControls.gamma_every
@@ -284,7 +290,7 @@ class Options:
             name, value = f.name, getattr(self, f.name)
             if isinstance(f.default, bool) and not isinstance(value, bool):
                 raise ParameterError(f"{name} must be true or false; got {value!r:.80}")
-            if isinstance(f.default, str) and not isinstance(value, str):
+            if isinstance(f.default, str) and not isinstance(value, str) and f.name != "stop":
                 also = ", such as 'mu = 0.27 MPa, limit = 76.5'" if f.name == "constants" else ""
                 raise ParameterError(f"{name} must be text{also}; got {value!r:.80}")
         require("speed", self.speed, "mm/s", low=0, low_open=True)
@@ -354,4 +360,6 @@ class Options:
             chosen |= {"bulk_modulus": material.bulk_modulus, "constants": constants_text(material)}
             if isinstance(material, AAA):
                 chosen |= {"c1": material.c1, "constants": ""}
+        if callable(self.stop):  # which stands in no file
+            chosen["stop"] = ""
         return {**chosen, "phi": self.sink_law().phi}

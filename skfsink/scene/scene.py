@@ -26,6 +26,7 @@ from ..meshing.symmetry import Whole
 from .controls import Controls
 from .digest import digest
 from .fibres import directions_of
+from .stop import stop_of
 from .stored import StoredScene
 
 __all__ = ["Scene"]
@@ -208,8 +209,10 @@ class Scene:
 
     def part(self, analysis: str) -> Scene:
         """This scene in one of the two analyses."""
-        return replace(self, parameters={**self.parameters, "analysis": analysis},
-                       controls=replace(self.controls, analysis=analysis))
+        stop = stop_of(self.controls.stop, analysis)
+        asked = {"analysis": analysis, "stop": "" if callable(stop) else stop}
+        return replace(self, parameters={**self.parameters, **asked},
+                       controls=replace(self.controls, analysis=analysis, stop=stop))
 
     def loading(self) -> Loading:
         """What is held, moved and pulled at each load time.

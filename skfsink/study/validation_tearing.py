@@ -164,7 +164,7 @@ PIECES = {"pure shear, 1.5 mm high": ("pure shear", 12.0, 1.5, 3.0),
 SOLID = "pure shear, 1.5 mm high, hexahedra"
 TROUSERS = "trousers, hexahedra"
 #: what the onset of trousers depends on, one at a time; each on one mesh
-CAUSES = {
+CAUSES: dict[str, Callable[[], dict[str, Any]]] = {
     "sheared out of its plane, 1.5 mm high": Piece("mode III", 8.0, 1.5, 3.0, 0, 1),
     "trousers, l/2 thick": Trousers(0, thickness=WIDTH / 2),
     "trousers, 2 l thick": Trousers(0, thickness=2 * WIDTH, layers=4),

@@ -14,8 +14,8 @@ from jinja2 import Environment
 
 from ..errors import OutputError
 from ..report.page import environment
-from ..report.scenes import kind, named
-from ..report.tables import EMPTY
+from ..report.scenes import kind
+from ..results.tables import EMPTY
 from ..system.version import __version__
 from .drawn import Drawn, Pictures
 from .figures import Figure, Scenes, joint_figures, own_figures
@@ -46,7 +46,7 @@ class Entry:
     def what(self) -> str:
         """Case, mesh and analysis."""
         run = self.seen.run
-        return "" if run is None else f"{named(run)}, mesh {run.parameters.get('mesh', EMPTY)}, {kind(run)}"
+        return "" if run is None else f"{run.title}, mesh {run.parameters.get('mesh', EMPTY)}, {kind(run)}"
 
     @property
     def phase(self) -> str:

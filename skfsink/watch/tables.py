@@ -6,9 +6,9 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from ..report.tables import EMPTY, Row, Table, row_of, table_of
 from ..results.history import Table as History
 from ..results.loader import ENERGIES
+from ..results.tables import EMPTY, Row, Table, row_of, table_of
 from .seen import Seen
 
 __all__ = ["energy_table", "now_table"]

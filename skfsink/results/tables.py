@@ -1,16 +1,20 @@
-"""Tables of the report: a row for each figure, a column for each run."""
+"""Tables about runs: a row for each figure, a column for each run."""
 
 from __future__ import annotations
 
+import html
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..results.history import onset_load
-from ..results.loader import ENERGIES, Run
+from .energies import ENERGIES
+from .history import onset_load
+
+if TYPE_CHECKING:
+    from .loader import Run
 
 __all__ = ["EMPTY", "Row", "Table", "cost_table", "energy_tables", "key_table", "number", "row_of", "table_of",
            "version_table"]
@@ -44,6 +48,21 @@ class Table:
     def units(self) -> bool:
         """Whether a row has a unit."""
         return any(row.unit for row in self.rows)
+
+    def __str__(self) -> str:
+        cells = [["", *(["unit"] if self.units else []), *self.columns],
+                 *([row.name, *([row.unit] if self.units else []), *row.cells] for row in self.rows)]
+        widths = [max(map(len, column)) for column in zip(*cells)]
+        return "\n".join("  ".join(cell.ljust(width) for cell, width in zip(line, widths)).rstrip() for line in cells)
+
+    def _repr_html_(self) -> str:
+        """For a notebook."""
+        def line(kind: str, cells: Sequence[str]) -> str:
+            return "<tr>" + "".join(f"<{kind}>{html.escape(cell)}</{kind}>" for cell in cells) + "</tr>"
+
+        head = line("th", ["", *(["unit"] if self.units else []), *self.columns])
+        rows = [line("td", [row.name, *([row.unit] if self.units else []), *row.cells]) for row in self.rows]
+        return f"<table><thead>{head}</thead><tbody>{''.join(rows)}</tbody></table>"
 
 
 def number(value: Any) -> str:
@@ -132,6 +151,8 @@ def key_table(runs: Sequence[Run], labels: Sequence[str], waves: Sequence[tuple[
         row("of these debris, smaller than l", "", "event", "debris"),
         row("U at the first arrival", energy, "energy", "U_paper_at_arrival"),
         row("D at the first arrival", energy, "energy", "D_sink_at_arrival"),
+        row("U at the end", energy, "energy", "U_paper_final"),
+        row("D at the end", energy, "energy", "D_sink_final"),
         row("failed elements", "", "deleted_elements"),
         row("balance error, of the onset energy", "%", "energy", "balance_error_relative", factor=100.0),
     ]
