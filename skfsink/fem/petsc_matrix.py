@@ -58,7 +58,7 @@ class Matrix:
     the order of their nodes.
 
     Memory: the matrix last given to `set`, and the hierarchy or the factors last made by `prepare`, which `conjugate`
-    and `substitute` use.
+    and `substitute` use and `release` drops.
 
     Parameters
     ----------

@@ -61,8 +61,8 @@ class DensitySolver:
 
     Its solutions are functions of the arguments alone: what it keeps between calls are counts.
 
-    Memory: counts, the `residual` of the last solve and the analysis of the matrix (`factorisations`). `solve` and
-    `update` depend on no earlier call.
+    Memory: counts, the `residual` of the last solve and the analysis of the matrix (`factorisations`), which `release`
+    drops. `solve` and `update` depend on no earlier call.
 
     Parameters
     ----------

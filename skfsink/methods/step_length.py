@@ -25,8 +25,8 @@ class StepLength:
     """The length of the next step of one integration.
 
     Memory: estimate of the limit and its mode, indicator, cuts, calm steps: `look`, `share`, `accepts`,
-    `is_given_up` and `give_up` go on from the body last looked at and the steps last tried, `rejects` from `fix`;
-    `memory` gives what a checkpoint needs.
+    `is_given_up`, `borne` and `give_up` go on from the body last looked at and the steps last tried, `rejects` from
+    `fix`; `memory` gives what a checkpoint needs.
 
     Parameters
     ----------

@@ -34,8 +34,8 @@ class Series:
 
     Points are those of the undeformed body: warp by the vector `displacement` to see it deformed.
 
-    Memory: the frames so far; `add` writes the next one, `flush` and `close` wait for the last one, `resume` takes up
-    those in the folder.
+    Memory: the frames so far; `add` and `add_pieces` write the next one, `flush` and `close` wait for the last one,
+    `resume` takes up those in the folder.
 
     Parameters
     ----------

@@ -104,7 +104,8 @@ class InParts:
     What changes in the parts is fetched when it is asked for: fields of the state, the reaction, stresses, and what the
     momentum balance of the whole body knows; of this no more is kept than that takes (see :class:`.Gathered`).
 
-    Memory: that of all ranks: after `begin` or `restore`, `run`, `sync` and `reaction` are of the state last stepped.
+    Memory: that of all ranks: after `begin` or `restore`, `run`, `sync`, `reaction`, `stress` and `crushed` are of the
+    state last stepped.
     """
 
     factorisations = 0

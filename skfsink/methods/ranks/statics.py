@@ -46,7 +46,8 @@ def check_statics(loading: Loading, controls: BodyControls, linear: str) -> None
 class NewtonInParts(Newton):
     """Newton's method with tangents in parts.
 
-    Memory: that of :class:`.Newton`, and of all ranks, from the first tangent to `release`.
+    Memory: that of :class:`.Newton`, and of all ranks, from the first `tangent` to
+    `release`: the `solver` of the last one.
     """
 
     def lead(self, body: Body, crew: Crew) -> None:

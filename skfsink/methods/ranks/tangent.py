@@ -19,7 +19,7 @@ __all__ = ["TangentOfPart"]
 class TangentOfPart:
     """One rank with the tangent of its part, for statics that the first rank leads.
 
-    Memory: the part and its matrix, from `take` to `release`; see :class:`.Matrix`.
+    Memory: the part and its `matrix`, from `take` to `release`, as `assemble` gave it its values; see :class:`.Matrix`.
     """
 
     def __init__(self, comm: MPI.Intracomm) -> None:

@@ -29,7 +29,7 @@ class View:
     for all others; an observer in its place has to set them too.
 
     Memory: all of it: the run moves it on with `at`, and `load`, `displacement`, `reaction`, `stress`,
-    `stress_is_known`, `step_share` and `crossed_multiple_of` are of the moment it is at.
+    `stress_is_known`, `crushed`, `step_share` and `crossed_multiple_of` are of the moment it is at.
 
     Attributes
     ----------
