@@ -21,6 +21,7 @@ from skfsink.cli.program import command
 from skfsink.cli.report import report
 from skfsink.errors import OutputError
 from skfsink.fields.energy import OPTIONAL_TERMS
+from skfsink.fields.frame_fields import ON_REQUEST
 from skfsink.meshing.vtu import write_mesh
 from skfsink.pictures import plot
 from skfsink.report import charts, citation, report_page, write_report
@@ -90,7 +91,7 @@ def test_frames_by_number_and_moment_plain_and_deformed(folder: Path) -> None:
     plain, deformed = frames.frame("end"), frames.frame(-1, deformed=True)
     np.testing.assert_allclose(deformed.points - plain.points, plain.point_data["displacement"], atol=1e-7)
     assert np.ptp(deformed.points - plain.points) > 0.05
-    assert {*plain.point_data, *plain.cell_data} == {*FIELD_UNITS} - {"region"}
+    assert {*plain.point_data, *plain.cell_data} == {*FIELD_UNITS} - {"region", "fibre_1", "fibre_2", *ON_REQUEST}
     assert plain.cell_data["stress"][0].shape[1] == 6
     assert len(list(frames)) == len(frames) and len(frames[1:3]) == 2
     with pytest.raises(IndexError):
