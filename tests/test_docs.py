@@ -357,3 +357,24 @@ def test_formulas_become_mathml() -> None:
     assert "<mi>𝐅</mi>" in text and "<mi>ℋ</mi>" in text and "<mfrac>" in text and "&#x0003C;" in text
     with pytest.raises(PluginError, match="cannot be shown"):
         hooks.mathml(r"\nosuchcommand{x}", False)
+
+
+# --- the first lines of the README ---
+@pytest.mark.slow
+def test_the_readme_prints_what_it_says(registries: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+                                        capsys: pytest.CaptureFixture[str]) -> None:
+    """Fails if the lines of Python in the README print something else than stands below them, or leave no picture.
+
+    Words have to be the same, and the onset to its last digit; energies of a crack that branches to a fifth.
+    """
+    (program,), (said,) = blocks("README.md", "python"), blocks("README.md", "text")
+    assert len(program.splitlines()) <= 10
+    monkeypatch.chdir(tmp_path)
+    exec(compile(program, "README.md", "exec", dont_inherit=True), {"__name__": "example"})
+    printed, number = capsys.readouterr().out, re.compile(r"\d+\.?\d*")
+    assert number.sub("#", printed) == number.sub("#", said)
+    assert printed.splitlines()[0] == said.splitlines()[0]
+    pairs = zip(number.findall(printed), number.findall(said), strict=True)
+    assert all(abs(float(one) - float(other)) <= max(0.2 * float(other), 1.0 * ("." not in other))
+               for one, other in pairs)
+    assert (tmp_path / "plate.png").stat().st_size > 10_000
