@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from bodies import boundary, box, patchy, wavy
 
-from skfsink.errors import ConvergenceError
-from skfsink.fem.direct import Factorization
+from skfsink.errors import ConvergenceError, ParameterError
+from skfsink.fem.direct import BACKENDS, Factorization
 from skfsink.fem.pattern import Pattern
 from skfsink.fem.space import Space
 from skfsink.fields.momentum import Momentum
 from skfsink.material import AAA
 
-BACKENDS = pytest.mark.parametrize("backend", ["pardiso", "superlu"])
+BACKENDS_THERE = pytest.mark.parametrize("backend", BACKENDS)
 
 
 def body(space: Space, seed: int = 2) -> tuple[Momentum, Pattern]:
@@ -25,10 +25,10 @@ def body(space: Space, seed: int = 2) -> tuple[Momentum, Pattern]:
     return momentum, Pattern(space, space.dim, np.repeat(~boundary(space), space.dim), upper=True)
 
 
-@BACKENDS
+@BACKENDS_THERE
 def test_solutions_of_definite_and_indefinite_matrices(space: Space, backend: str):
     """Fails if a backend returns garbage, or does not tell whether the matrix is positive definite."""
-    pytest.importorskip("pypardiso" if backend == "pardiso" else "scipy")
+    pytest.importorskip(BACKENDS[backend])
     momentum, pattern = body(space)
     solver = Factorization(pattern, backend)
     data = momentum.tangent(pattern, np.zeros_like(space.X))
@@ -44,10 +44,10 @@ def test_solutions_of_definite_and_indefinite_matrices(space: Space, backend: st
     assert solver.count == 6
 
 
-@BACKENDS
+@BACKENDS_THERE
 def test_singular_matrix_is_an_error(backend: str):
     """Fails if a matrix that is singular gives a solution without a word."""
-    pytest.importorskip("pypardiso" if backend == "pardiso" else "scipy")
+    pytest.importorskip(BACKENDS[backend])
     space = box("quad", 3)
     pattern = Pattern(space, 2, upper=True)
     data = Momentum(space, AAA()).tangent(pattern, np.zeros_like(space.X))  # nothing holds the body
@@ -55,6 +55,17 @@ def test_singular_matrix_is_an_error(backend: str):
     with pytest.raises((ConvergenceError, RuntimeError)):
         solver.factorize(data)
         solver.solve(np.random.default_rng(0).normal(size=pattern.size))
+
+
+def test_a_backend_that_is_not_installed_is_refused(monkeypatch: pytest.MonkeyPatch):
+    """Fails if another one is taken in its place in silence, or "direct" does not take the next."""
+    pattern = body(box("quad", 3))[1]
+    monkeypatch.setitem(BACKENDS, "pardiso", "no_such_module")
+    monkeypatch.setitem(BACKENDS, "cholmod", "none_of_these")
+    with pytest.raises(ParameterError, match="linear pardiso needs no_such_module, which is not installed; there are "
+                                             "superlu, or take linear = 'direct'"):
+        Factorization(pattern, "pardiso")
+    assert Factorization(pattern).backend == "superlu"
 
 
 def test_conjugate_gradients_with_factors_of_another_matrix(space: Space):

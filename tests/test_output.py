@@ -98,7 +98,7 @@ def test_each_column_says_its_unit_and_old_files_are_read(tmp_path: Path, dim: i
     assert onset_load({load_name(dim): 2.0}) == onset_load({"reaction_N_per_mm": 2.0}) == 2.0
     assert loaded.dim == dim and loaded[f"reaction_{force}"] is loaded["reaction_N_per_mm"]
     assert {name.replace(" ", "_").replace("/", "_per_") for name in loaded.units.values()} == {
-        "", "1", "s", "mm", "m_per_s", "MPa", f"mm^{dim}", force, energy}
+        "", "1", "s", "mm", "m_per_s", "MPa", "N_per_mm", f"mm^{dim}", force, energy}
     with pytest.raises(KeyError):
         loaded["nothing"]
     old = history.path.read_text().replace(",".join(header), ",".join(HISTORY_COLUMNS), 1)

@@ -40,7 +40,7 @@ def finished(count: int, *arguments: str | Path, status: int = 0) -> str:
 @pytest.mark.parametrize("name", PETSC)
 def test_a_missing_library_is_found_out_first(name: str) -> None:
     """Fails if a body is loaded before somebody asks whether petsc4py is there."""
-    with pytest.raises(ParameterError, match=f"linear {name} needs petsc4py .*: install it, or take --linear multig"):
+    with pytest.raises(ParameterError, match=f"linear {name} needs petsc4py .*: install it, or take linear = .multig"):
         check(name)
 
 

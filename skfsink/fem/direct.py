@@ -10,6 +10,7 @@ import math
 import os
 from collections.abc import Callable
 from contextlib import AbstractContextManager
+from importlib.util import find_spec
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,21 +18,32 @@ import scipy.sparse.linalg as sla
 from scipy.sparse import csc_array, csr_array
 from threadpoolctl import ThreadpoolController
 
-from ..errors import ConvergenceError
+from ..errors import ConvergenceError, ParameterError
 from ..system.jit import njit
 from .pattern import Pattern
 
 os.environ.setdefault("MKL_CBWR", "AUTO,STRICT")  # the same bits from one run to the next, whatever the alignment
 
-__all__ = ["Factorization", "add_symmetric_product", "conjugate", "one_thread_of_openblas", "symmetric",
+__all__ = ["BACKENDS", "Factorization", "add_symmetric_product", "conjugate", "one_thread_of_openblas", "symmetric",
            "symmetric_product", "unsigned"]
 
 Vectors = Callable[[np.ndarray], np.ndarray]
 
 try:
     import pypardiso
-except ImportError:  # not x86-64: SuperLU does it, several times slower
+except ImportError:  # not x86-64: CHOLMOD does it where it is installed, else SuperLU, several times slower
     pypardiso = None
+
+BACKENDS = {"pardiso": "pypardiso", "cholmod": "sksparse", "superlu": "scipy"}  #: and the modules that they come with
+
+
+def _backend(asked: str | None) -> str:
+    """That asked for, or the first one that is installed; ParameterError if it is not there."""
+    there = [name for name, module in BACKENDS.items() if find_spec(module) is not None]
+    if asked is not None and asked not in there:
+        raise ParameterError(f"linear {asked} needs {BACKENDS[asked]}, which is not installed; there are "
+                             f"{', '.join(there)}, or take linear = 'direct'")
+    return asked or there[0]
 
 
 def one_thread_of_openblas() -> AbstractContextManager[Any]:
@@ -48,10 +60,17 @@ class Factorization:
     Parameters
     ----------
     pattern: upper-triangular pattern.
-    backend: "pardiso" (MKL), "superlu" (SciPy), or None for the first that is installed.
-    threads: threads of the factorisation; results are the same to the last bit only with one.
+    backend: "pardiso" (MKL), "cholmod" (SuiteSparse, by scikit-sparse), "superlu" (SciPy), or None for the first of
+        them that is installed.
+    threads: threads of the factorisation by PARDISO; results are the same to the last bit only with one.
 
-    PARDISO is told that the matrix is positive definite; where it is not, it is factorised again as indefinite.
+    PARDISO and CHOLMOD are told that the matrix is positive definite; where it is not, it is factorised again as
+    indefinite by PARDISO, or by SuperLU in the place of CHOLMOD.
+
+    Raises
+    ------
+    ParameterError
+        The backend that was asked for is not installed.
     """
 
     exact = True     # whether `apply` is a solution in no time
@@ -60,12 +79,13 @@ class Factorization:
 
     def __init__(self, pattern: Pattern, backend: str | None = None, threads: int = 1) -> None:
         self.pattern = pattern
-        self.backend = backend or ("pardiso" if pypardiso is not None else "superlu")
+        self.backend = _backend(backend)
         self.threads = threads
         self.count = 0            #: numerical factorisations made
         self.definite = True      #: whether the last matrix was found positive definite
         self._handles: dict[int, _Pardiso] = {}
         self._lu: sla.SuperLU | None = None
+        self._cholesky: Any = None
         self._matrix: csr_array | None = None
 
     def factorize(self, data: np.ndarray, indefinite: bool = True) -> bool:
@@ -77,16 +97,32 @@ class Factorization:
         if not self.pattern.size:  # every node is held: nothing is unknown
             return True
         self._matrix = self.pattern.matrix(data)
-        if self.backend == "superlu":
+        if self.backend != "pardiso":
+            self._lu = None
             whole = csc_array(self.pattern.symmetric(data))
-            self._lu = sla.splu(whole, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
-                                options={"SymmetricMode": True})
-            self.definite = bool((self._lu.perm_r == self._lu.perm_c).all() and (self._lu.U.diagonal() > 0).all())
+            self.definite = self.backend == "cholmod" and self._by_cholmod(whole)
+            if not self.definite and (indefinite or self.backend == "superlu"):
+                self.definite = self._by_superlu(whole) and self.backend == "superlu"
             return self.definite
         self.definite = self._handle(2).factorize(data)
         if not self.definite and indefinite and not self._handle(-2).factorize(data):
             raise ConvergenceError("the matrix cannot be factorised")
         return self.definite
+
+    def _by_superlu(self, whole: csc_array) -> bool:
+        self._lu = lu = sla.splu(whole, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
+                                 options={"SymmetricMode": True})
+        return bool((lu.perm_r == lu.perm_c).all() and (lu.U.diagonal() > 0).all())
+
+    def _by_cholmod(self, whole: csc_array) -> bool:
+        from sksparse import cholmod
+        if self._cholesky is None:
+            self._cholesky = cholmod.analyze(whole, mode="supernodal", ordering_method="best")
+        try:
+            self._cholesky.cholesky_inplace(whole)
+        except cholmod.CholmodNotPositiveDefiniteError:
+            return False
+        return True
 
     def solve(self, b: np.ndarray, tolerance: float = 1e-9) -> np.ndarray:
         """Solution of A x = b; refined once if its relative residual is above `tolerance`.
@@ -119,9 +155,10 @@ class Factorization:
         """
         if not b.size:
             return b
-        if self.backend == "superlu":
-            assert self._lu is not None
+        if self._lu is not None:
             return self._lu.solve(b)
+        if self.backend != "pardiso":
+            return np.asarray(self._cholesky(b))
         return self._handle(2 if self.definite else -2).solve(b)
 
     def solve_sum(self, B: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -147,7 +184,7 @@ class Factorization:
         for handle in self._handles.values():
             handle.release()
         self._handles.clear()
-        self._lu = None
+        self._lu = self._cholesky = None
 
     def _times(self, x: np.ndarray) -> np.ndarray:
         assert self._matrix is not None

@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from .direct import Factorization
+from .direct import BACKENDS, Factorization
 from .multigrid import Multigrid
 from .pattern import Pattern
 from .petsc import OnOneRank, Petsc
@@ -19,13 +19,14 @@ __all__ = ["LINEAR", "Solver", "solver"]
 Solver = Factorization | Multigrid | Petsc
 
 
-def _direct(space: Space, free: np.ndarray, pattern: Pattern, threads: int) -> Solver:
-    return Factorization(pattern, threads=threads)
+def _direct(backend: str | None, space: Space, free: np.ndarray, pattern: Pattern, threads: int) -> Solver:
+    return Factorization(pattern, backend, threads)
 
 
-#: "direct" takes PARDISO, or SuperLU where that is not installed
+#: "direct" takes the first of the backends of :class:`.Factorization` that is installed
 LINEAR: dict[str, Callable[[Space, np.ndarray, Pattern, int], Solver]] = {
-    "direct": _direct, "multigrid": Multigrid, **{name: partial(OnOneRank, name) for name in PETSC}}
+    "direct": partial(_direct, None), **{name: partial(_direct, name) for name in BACKENDS}, "multigrid": Multigrid,
+    **{name: partial(OnOneRank, name) for name in PETSC}}
 
 
 def solver(name: str, space: Space, free: np.ndarray, pattern: Pattern, threads: int) -> Solver:

@@ -112,7 +112,7 @@ class Parted:
     def _read(self, number: int) -> Iterator[Mapping[str, np.ndarray]]:
         path = self.folder / _file(number)
         try:
-            with np.load(path) as file:
+            with np.load(path, allow_pickle=False) as file:
                 yield file
         except UNREADABLE as error:
             raise ParameterError(f"{path} cannot be read ({type(error).__name__}): make the parts anew with skfsink "
