@@ -310,7 +310,7 @@ def test_a_part_that_one_rank_cannot_read(parted: tuple[Path, Path], tmp_path: P
 
 # --- all ranks ---
 @ranks
-@pytest.mark.parametrize("count", [2, 3])
+@pytest.mark.parametrize("count", [2, pytest.param(3, marks=pytest.mark.slow)])
 def test_parts_add_up_to_the_whole_body(count: int) -> None:
     """Fails if a sum, a copy or a decision differs from that of the whole body on any rank; see `on_ranks.py`."""
     finished(on(count, HERE / "on_ranks.py"))
@@ -392,7 +392,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path, float]:
 
 @ranks
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", range(10), ids=lambda seed: f"again{seed}" if seed else "once")
 def test_a_lost_rank_ends_all_and_the_run_goes_on(seed: int, whole: tuple[Path, Path, float], tmp_path: Path) -> None:
     """Fails if a run waits for a rank that is lost at any moment, leaves a checkpoint that is torn, a lock or a
     process, or does not go on on another number of ranks to the same results."""
