@@ -392,7 +392,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path, float]:
 
 @ranks
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(10), ids=lambda seed: f"again{seed}" if seed else "once")
+@pytest.mark.parametrize("seed", range(10), ids=lambda seed: f"lostagain{seed}" if seed else "once")
 def test_a_lost_rank_ends_all_and_the_run_goes_on(seed: int, whole: tuple[Path, Path, float], tmp_path: Path) -> None:
     """Fails if a run waits for a rank that is lost at any moment, leaves a checkpoint that is torn, a lock or a
     process, or does not go on on another number of ranks to the same results."""
