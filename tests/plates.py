@@ -27,7 +27,7 @@ from skfsink.run import compute
 from skfsink.system.files import HIDDEN
 
 os.environ["SKFSINK_DEBUG"] = "1"  # what should not happen is a traceback then
-DRAW = {name: getattr(compute, name) for name in ("draw_run", "draw_comparison")}
+DRAW = {name: getattr(compute, name) for name in ("draw_run", "draw_comparison", "draw_what_there_is")}
 SMALL = ["--length-scale", "0.6", "--hht-dt", "5e-7", "--quiet"]  # for the elements of 0.3 mm of `plate()`
 
 

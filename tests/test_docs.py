@@ -361,7 +361,7 @@ def test_formulas_become_mathml() -> None:
 
 # --- the first lines of the README ---
 @pytest.mark.slow
-def test_the_readme_prints_what_it_says(registries: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+def test_the_readme_prints_what_it_says(registries: None, pictures: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
                                         capsys: pytest.CaptureFixture[str]) -> None:
     """Fails if the lines of Python in the README print something else than stands below them, or leave no picture.
 
