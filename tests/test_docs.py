@@ -361,8 +361,8 @@ def test_formulas_become_mathml() -> None:
 
 # --- the first lines of the README ---
 @pytest.mark.slow
-def test_the_readme_prints_what_it_says(registries: None, pictures: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-                                        capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_readme_prints_what_it_says(registries: None, pictures: None, tmp_path: Path,
+                                        monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     """Fails if the lines of Python in the README print something else than stands below them, or leave no picture.
 
     Words have to be the same, and the onset to its last digit; energies of a crack that branches to a fifth.
