@@ -28,6 +28,7 @@ from plates import SMALL, forked, invoke, invoke_program, plate
 from skfsink.errors import Interrupted, OutputError
 from skfsink.meshing.vtu import write_mesh
 from skfsink.results.status import STATUS, Status
+from skfsink.results.stored_series import pack_series
 from skfsink.run import told
 from skfsink.run.compute import run
 from skfsink.run.display import Display
@@ -200,6 +201,17 @@ def test_torn_files_are_said_and_end_nothing(copy: Path) -> None:
         (copy / name).write_text(kept)
     (copy / HOLDER).unlink(), (copy / STATUS).write_text("{")
     assert seen(copy)[0] == "damaged"
+
+
+def test_frames_in_one_file_are_drawn(copy: Path) -> None:
+    """Fails if the body of a run whose frames were packed into one file is not shown."""
+    pytest.importorskip("h5py")
+    pack_series(copy / "series", "run")
+    assert not list((copy / "series").glob("run*.pvd"))
+    watch = Watch([copy])
+    assert "density-0.png" in watch.page()
+    drawn = watch.picture("density-0.png")
+    assert drawn is not None and drawn.content.startswith(b"\x89PNG")
 
 
 def test_a_run_that_vanishes_is_gone(copy: Path) -> None:

@@ -79,8 +79,10 @@ def own_figures(key: int, seen: Seen, scenes: Scenes) -> list[Figure]:
         return []
     found = []
     for name in ("run", "loading"):
-        index = run.folder / "series" / f"{name}.pvd"
-        if index.is_file() and b"<DataSet" in index.read_bytes():
+        index, packed = (run.folder / "series" / f"{name}.{kind}" for kind in ("pvd", "vtkhdf"))
+        if not index.is_file():
+            index = packed
+        if index.is_file() and (index == packed or b"<DataSet" in index.read_bytes()):
             alt = lead + "relative density γ on the deformed body"
             found.append(Figure(f"density-{key}.png", "Relative density", alt, (name, stamp_of(index)),
                                 partial(_density, run, name, scenes, alt)))

@@ -26,7 +26,8 @@ STATES = {"running": "it goes on", "silent": "it ran on another machine and has 
           "waiting": "it has not begun", "finished": "it has come to its end", "failed": "it has ended with an error",
           "interrupted": "it was stopped and can be resumed", "killed": "its process is gone and it can be resumed",
           "gone": "its folder is not there any more", "damaged": "its files cannot be read"}
-FILES = (SCENE, STATUS, HOLDER, SUMMARY, "history.csv", "series/run.pvd", "series/loading.pvd")
+FILES = (SCENE, STATUS, HOLDER, SUMMARY, "history.csv",
+         *(f"series/{name}.{kind}" for name in ("run", "loading") for kind in ("pvd", "vtkhdf")))
 SILENT = 600.0  # seconds without a word after which a run on another machine is not taken to go on
 LONG = 60.0     # seconds without a word that are said of a run that goes on
 
