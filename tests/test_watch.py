@@ -206,8 +206,9 @@ def test_torn_files_are_said_and_end_nothing(copy: Path) -> None:
 def test_frames_in_one_file_are_drawn(copy: Path) -> None:
     """Fails if the body of a run whose frames were packed into one file is not shown."""
     pytest.importorskip("h5py")
-    pack_series(copy / "series", "run")
-    assert not list((copy / "series").glob("run*.pvd"))
+    for name in ("run", "loading"):
+        pack_series(copy / "series", name)
+    assert not list((copy / "series").glob("*.pvd"))
     watch = Watch([copy])
     assert "density-0.png" in watch.page()
     drawn = watch.picture("density-0.png")
