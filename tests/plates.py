@@ -23,6 +23,7 @@ from skfsink.cases.single_edge_notch import single_edge_notch
 from skfsink.cli.program import command
 from skfsink.meshing.sample import Sample, file_sample
 from skfsink.meshing.vtu import write_mesh
+from skfsink.results.status import STATUS
 from skfsink.run import compute
 from skfsink.system.files import HIDDEN
 
@@ -99,7 +100,8 @@ def forked(arguments: Sequence[object], stop: int = 0, number: signal.Signals = 
     """Exit status and stderr of the command line in a child process.
 
     The child sends itself the signal `number` at the `stop`-th operation on a file (0: never): before a sync, a
-    replacement or a removal, and between the two syncs that a replacement takes.
+    replacement or a removal, and between the two syncs that a replacement takes. What is done with `status.json` does
+    not count.
     """
     read, write = os.pipe()
     if (child := os.fork()) == 0:
@@ -109,6 +111,8 @@ def forked(arguments: Sequence[object], stop: int = 0, number: signal.Signals = 
         def counted(operation: Any) -> Any:
             def wrapper(*args: Any, **kwargs: Any) -> Any:
                 nonlocal done
+                if any(STATUS in str(arg) for arg in args):  # which hangs on the clock
+                    return operation(*args, **kwargs)
                 done += 1
                 if done == stop:
                     os.kill(os.getpid(), number)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from bodies import boundary, box, patchy, wavy
 
 from skfsink.errors import ConvergenceError, ParameterError
+from skfsink.fem import direct
 from skfsink.fem.direct import BACKENDS, Factorization
 from skfsink.fem.pattern import Pattern
 from skfsink.fem.space import Space
@@ -60,11 +62,12 @@ def test_singular_matrix_is_an_error(backend: str):
 def test_a_backend_that_is_not_installed_is_refused(monkeypatch: pytest.MonkeyPatch):
     """Fails if another one is taken in its place in silence, or "direct" does not take the next."""
     pattern = body(box("quad", 3))[1]
-    monkeypatch.setitem(BACKENDS, "pardiso", "no_such_module")
-    monkeypatch.setitem(BACKENDS, "cholmod", "none_of_these")
-    with pytest.raises(ParameterError, match="linear pardiso needs no_such_module, which is not installed; there are "
-                                             "superlu, or take linear = 'direct'"):
-        Factorization(pattern, "pardiso")
+    monkeypatch.setattr(direct, "pypardiso", None)
+    monkeypatch.setitem(sys.modules, "sksparse.cholmod", None)  # as if it were not there
+    for name, module in (("pardiso", "pypardiso"), ("cholmod", "sksparse")):
+        with pytest.raises(ParameterError, match=f"linear {name} needs {module}, which is not installed: install it, "
+                                                 "or take linear = 'direct'"):
+            Factorization(pattern, name)
     assert Factorization(pattern).backend == "superlu"
 
 

@@ -11,7 +11,7 @@ from bodies import box
 from plates import SMALL, invoke
 
 from skfsink.errors import ConvergenceError, ParameterError
-from skfsink.fem.direct import Factorization
+from skfsink.fem.direct import BACKENDS, Factorization
 from skfsink.fem.linear import LINEAR, solver
 from skfsink.fem.multigrid import Multigrid, rigid_motions
 from skfsink.fem.pattern import Pattern
@@ -22,7 +22,7 @@ from skfsink.methods.newton import Newton
 from skfsink.results.history import History
 
 HAS_PETSC = importlib.util.find_spec("petsc4py") is not None
-NAMES = [name for name in LINEAR if name != "direct" and (HAS_PETSC or "petsc" not in name)]
+NAMES = [name for name in LINEAR if name not in ("direct", *BACKENDS) and (HAS_PETSC or "petsc" not in name)]
 
 
 def held(space: Space) -> np.ndarray:
@@ -127,7 +127,7 @@ def test_a_body_is_loaded_to_the_same_onset(name: str, mesh: Path, tmp_path: Pat
 def test_words_that_are_none(tmp_path: Path) -> None:
     """Fails if an unknown solver is taken, or a missing PETSc is found out late."""
     status, said, _ = invoke("--linear", "lu", "--out", tmp_path / "run")
-    names = "direct, multigrid, petsc-gamg, petsc-mumps"
+    names = "direct, pardiso, cholmod, superlu, multigrid, petsc-gamg, petsc-mumps"
     assert (status, said) == (2, f"skfsink: linear must be one of {names}; got 'lu'\n")
     if not HAS_PETSC:
         space = box("quad", 3)

@@ -227,7 +227,7 @@ def test_parts_of_another_number_of_ranks(count: int, said: str, parted: tuple[P
 @metis
 def test_frames_in_pieces_are_those_of_one_file(parted: tuple[Path, Path], tmp_path: Path) -> None:
     """Fails if a piece is of another moment, or a field, a node or an element differs; or ParaView finds no pieces."""
-    import vtk
+    vtk = pytest.importorskip("vtk")
     from vtk.util.numpy_support import vtk_to_numpy
     for name, more in (("one", []), ("pieces", ["--frame-pieces"])):
         finished(on(2, "-m", "skfsink", "run", parted[0], "--out", tmp_path / name, "--quiet", *more))

@@ -84,7 +84,7 @@ def test_interrupted_runs_say_how_to_go_on(kind: str, number: signal.Signals, me
     arguments = ["--mesh", mesh, "--checkpoint-every", "0.02", *SMALL, *RUNS[kind]]
     assert forked([*arguments, "--out", tmp_path / "whole"]) == (0, "")
     go_on, stops = [*arguments, "--out", out], 0
-    for stop in (32, 8, 8, 40):  # in the loading, soon after a resume, later
+    for stop in (27, 8, 8, 40):  # in the loading, soon after a resume, later
         status, text = forked(go_on, stop, number)
         if status == 0:
             break

@@ -10,7 +10,6 @@ import math
 import os
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from importlib.util import find_spec
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -37,13 +36,22 @@ except ImportError:  # not x86-64: CHOLMOD does it where it is installed, else S
 BACKENDS = {"pardiso": "pypardiso", "cholmod": "sksparse", "superlu": "scipy"}  #: and the modules that they come with
 
 
+def _is_there(backend: str) -> bool:
+    if backend != "cholmod":
+        return backend == "superlu" or pypardiso is not None
+    try:
+        import sksparse.cholmod  # noqa: F401
+    except ImportError:
+        return False
+    return True
+
+
 def _backend(asked: str | None) -> str:
     """That asked for, or the first one that is installed; ParameterError if it is not there."""
-    there = [name for name, module in BACKENDS.items() if find_spec(module) is not None]
-    if asked is not None and asked not in there:
-        raise ParameterError(f"linear {asked} needs {BACKENDS[asked]}, which is not installed; there are "
-                             f"{', '.join(there)}, or take linear = 'direct'")
-    return asked or there[0]
+    if asked is not None and not _is_there(asked):
+        raise ParameterError(f"linear {asked} needs {BACKENDS[asked]}, which is not installed: install it, or take "
+                             f"linear = 'direct'")
+    return asked or next(filter(_is_there, BACKENDS))
 
 
 def one_thread_of_openblas() -> AbstractContextManager[Any]:
