@@ -19,7 +19,7 @@ SQUEEZED = 0.5  # of its height: the body buckles
 
 def check_solver(name: str, body: Body, u: np.ndarray, dim: int) -> None:
     """Solutions in parts are those of factors of the whole body, found in as many iterations as on one rank."""
-    space, part = body.space, parts_of(body, ExplicitControls(), COMM.size)[COMM.rank]
+    space, part = body.space, list(parts_of(body, ExplicitControls(), COMM.size))[COMM.rank]
     pattern = Pattern(space, dim, body.free, upper=True)
     factors, alone = Factorization(pattern), OnOneRank(name, space, body.free, pattern)
     tangent, numbers = TangentOfPart(COMM), part.numbers
