@@ -105,16 +105,18 @@ class Factorization:
         if not self.pattern.size:  # every node is held: nothing is unknown
             return True
         self._matrix = self.pattern.matrix(data)
-        if self.backend != "pardiso":
-            self._lu = None
-            whole = csc_array(self.pattern.symmetric(data))
-            self.definite = self.backend == "cholmod" and self._by_cholmod(whole)
-            if not self.definite and (indefinite or self.backend == "superlu"):
-                self.definite = self._by_superlu(whole) and self.backend == "superlu"
+        if self.backend == "pardiso":
+            self.definite = self._handle(2).factorize(data)
+            if not self.definite and indefinite and not self._handle(-2).factorize(data):
+                raise ConvergenceError("the matrix cannot be factorised")
             return self.definite
-        self.definite = self._handle(2).factorize(data)
-        if not self.definite and indefinite and not self._handle(-2).factorize(data):
-            raise ConvergenceError("the matrix cannot be factorised")
+        self._lu, whole = None, csc_array(self.pattern.symmetric(data))
+        if self.backend == "superlu":
+            self.definite = self._by_superlu(whole)
+        else:
+            self.definite = self._by_cholmod(whole)
+            if not self.definite and indefinite:
+                self._by_superlu(whole)
         return self.definite
 
     def _by_superlu(self, whole: csc_array) -> bool:

@@ -81,7 +81,8 @@ class Weights:
 
     def __init__(self, space: Space) -> None:
         n, na = space.n_nodes, space.conn.shape[1]
-        local = np.einsum("eq,eqai,eqbi->eab", space.w, space.dN, space.dN)
+        slopes = space.dN
+        local = np.einsum("eq,eqai,eqbi->eab", space.w, slopes, slopes)
         rows, columns = np.repeat(space.conn, na, axis=1).ravel(), np.tile(space.conn, (1, na)).ravel()
         self.matrix = csr_array(coo_array((local.ravel(), (rows, columns)), shape=(n, n)))
         self.matrix.sum_duplicates()

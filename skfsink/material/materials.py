@@ -10,7 +10,7 @@ from typing import Any
 from ..errors import ParameterError, choose
 from ..units import number_in
 from .base import Material
-from .constants import material_of
+from .constants import material_of, own_names
 from .library import LIMITERS, MATERIALS, limiter_of
 from .sink import SinkLaw
 
@@ -51,8 +51,8 @@ class Materials:
     def __repr__(self) -> str:
         lines = ["materials, with the defaults of their constants, and limiters in MPa:"]
         for law, kind in MATERIALS.items():
-            shared = {field.name for field in fields(Material)}
-            own = ", ".join(f"{f.name}={f.default!r}" for f in fields(kind) if f.name not in shared)
+            defaults = {field.name: field.default for field in fields(kind)}
+            own = ", ".join(f"{constant}={defaults[constant]!r}" for constant in own_names(law))
             limiter = f"; phi {LIMITERS[law].phi:g}" if law in LIMITERS else ""
             lines.append(f"  {law.replace('-', '_')}({own}){limiter}")
         return "\n".join(lines)

@@ -56,7 +56,7 @@ def draw_run(scene: Scene, folder: Path, series: str, moments: Mapping[str, int]
         return
     history = History.load(folder / "history.csv")
     keys = run.keys()
-    frames = run.frames(keys, [cell for name in run.asked for cell in cells_of(name)])
+    frames = run.frames(keys, run.cells)
     density_picture(scene.space, frames, run.path("density"), run.title, scene.view)
     for name in (*(() if quasistatic else ("speed",)), *run.asked):
         field_picture(scene.space, frames, name, run.path(name), run.title, scene.view)
@@ -97,6 +97,7 @@ class _Files:
     def __post_init__(self) -> None:
         self.stored = StoredSeries.of(self.folder / "series", self.series)
         self.asked = asked_fields(self.scene.controls.fields)
+        self.cells = [cell for name in self.asked for cell in cells_of(name)]
 
     def path(self, name: str) -> Path:
         """Of the picture of that name."""
@@ -134,8 +135,7 @@ def _event(history: Table) -> Table:
 def _draw_loading(run: _Files) -> None:
     """`density`, `loading`, fields and `animation.gif` of a run that did not fail."""
     scene = run.scene
-    frames = run.frames(sorted({len(run.stored) // 2, len(run.stored) - 1}),
-                        [cell for name in run.asked for cell in cells_of(name)])
+    frames = run.frames(sorted({len(run.stored) // 2, len(run.stored) - 1}), run.cells)
     density_picture(scene.space, frames, run.path("density"), run.title, scene.view)
     for name in run.asked:
         field_picture(scene.space, frames, name, run.path(name), run.title, scene.view)

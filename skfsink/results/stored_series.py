@@ -15,7 +15,16 @@ from .frame import Frame, frame_file, frame_of, read_fields
 from .series import frame_times
 from .vtkhdf import PackedSeries, pack
 
-__all__ = ["StoredSeries", "pack_series"]
+__all__ = ["PACKED", "StoredSeries", "pack_series", "series_index"]
+
+
+PACKED = ".vtkhdf"  #: suffix of the one file of all frames
+
+
+def series_index(folder: Path, name: str) -> Path:
+    """The file that knows the frames of a series: `NAME.pvd` or, once they are packed, the one file that has them."""
+    index, packed = (folder / f"{name}{suffix}" for suffix in (".pvd", PACKED))
+    return packed if packed.is_file() and not index.is_file() else index
 
 
 @dataclass(frozen=True)
@@ -42,10 +51,11 @@ class StoredSeries:
         OutputError
             It is not there, or damaged.
         """
-        if (path := folder / f"{name}.vtkhdf").is_file() and not (folder / f"{name}.pvd").is_file():
-            packed = PackedSeries(path)
+        index = series_index(folder, name)
+        if index.suffix == PACKED:
+            packed = PackedSeries(index)
             return cls(folder, name, packed.times, packed)
-        return cls(folder, name, frame_times(folder / f"{name}.pvd"))
+        return cls(folder, name, frame_times(index))
 
     def __len__(self) -> int:
         return len(self.times)
@@ -84,7 +94,7 @@ def pack_series(folder: Path, name: str) -> None:
     series = StoredSeries.of(folder, name)
     if series.packed is not None or not len(series):
         return
-    pack(folder / f"{name}.vtkhdf", series.times, (series.mesh(number) for number in range(len(series))))
+    pack(folder / f"{name}{PACKED}", series.times, (series.mesh(number) for number in range(len(series))))
     (folder / f"{name}.pvd").unlink()  # from here on it is the other file that counts
     for number in range(len(series)):
         (folder / frame_file(name, number)).unlink()

@@ -14,7 +14,6 @@ import os
 for _name in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
-import logging
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -37,8 +36,7 @@ from .chart import page
 from .ladder import scene_of
 from .part import Part, Planned, Points
 from .rates import RATES, extrapolated
-from .speed_accuracy import run_parts
-from .store import Store
+from .speed_accuracy import measure
 
 __all__ = ["EVENT", "LAYERS", "Event", "convergence"]
 
@@ -247,10 +245,7 @@ def convergence(*, quick: Annotated[bool, FLAG] = False, fresh: Annotated[bool, 
     quiet
         Show no progress.
     """
-    logging.getLogger("skfsink").setLevel(logging.ERROR)
-    store = Store(out / "convergence.json", "convergence", fresh)
-    with Display(quiet) as display:
-        run_parts(store, [EVENT] if quick else [EVENT, LAYERS], quick, display)
+    measure("convergence", [EVENT] if quick else [EVENT, LAYERS], out, quick, fresh, quiet)
 
 
 if __name__ == "__main__":

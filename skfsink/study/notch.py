@@ -14,7 +14,6 @@ import os
 for _name in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
-import logging
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -27,12 +26,10 @@ from cyclopts import Parameter
 
 from ..meshing.outline import Edge, SizeField, mesh_outline
 from ..meshing.sample import Sample, mesh_sample
-from ..run.display import Display
 from .chart import page
 from .part import Part, Planned, Points
 from .plate import Plate
-from .speed_accuracy import run_parts
-from .store import Store
+from .speed_accuracy import measure
 
 __all__ = ["ONSET", "Tip", "notch", "plate_mesh"]
 
@@ -262,10 +259,7 @@ def notch(*, quick: Annotated[bool, FLAG] = False, fresh: Annotated[bool, FLAG] 
     quiet
         Show no progress.
     """
-    logging.getLogger("skfsink").setLevel(logging.ERROR)
-    store = Store(out / "notch.json", "notch", fresh)
-    with Display(quiet) as display:
-        run_parts(store, [ONSET], quick, display)
+    measure("notch", [ONSET], out, quick, fresh, quiet)
 
 
 if __name__ == "__main__":

@@ -16,7 +16,6 @@ for _name in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
 import json
-import logging
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,13 +25,11 @@ import meshio
 import numpy as np
 from cyclopts import Parameter
 
-from ..run.display import Display
 from ..system.files import write_atomic
 from .chart import page
 from .part import Part, Planned, Points
 from .ranks_scenes import SCENES, on_ranks
-from .speed_accuracy import run_parts
-from .store import Store
+from .speed_accuracy import measure
 
 __all__ = ["RANKS", "ranks"]
 
@@ -244,10 +241,7 @@ def ranks(*, only: Literal["scaling", "scenes"] | None = None, quick: Annotated[
     quiet
         Show no progress.
     """
-    logging.getLogger("skfsink").setLevel(logging.ERROR)
-    store = Store(out / "ranks.json", "ranks", fresh)
-    with Display(quiet) as display:
-        run_parts(store, [PARTS[only]] if only else list(PARTS.values()), quick, display)
+    measure("ranks", [PARTS[only]] if only else list(PARTS.values()), out, quick, fresh, quiet)
 
 
 if __name__ == "__main__":

@@ -33,7 +33,7 @@ from .solvers import SOLVERS
 from .store import Store
 from .tolerance import TOLERANCE
 
-__all__ = ["PARTS", "run_parts", "speed_accuracy"]
+__all__ = ["PARTS", "measure", "run_parts", "speed_accuracy"]
 
 PARTS: dict[str, Part] = {part.name: part for part in (TIME, TOLERANCE, RAISED, SPACE, MODEL, SOLVERS)}
 FLAG = Parameter(negative="", show_default=False)
@@ -58,10 +58,15 @@ def speed_accuracy(*, only: Literal["time", "tolerance", "raised", "space", "mod
     quiet
         Show no progress.
     """
+    measure("speed_accuracy", [PARTS[only]] if only else list(PARTS.values()), out, quick, fresh, quiet)
+
+
+def measure(name: str, parts: list[Part], out: Path, quick: bool, fresh: bool, quiet: bool) -> None:
+    """Measure the parts of the study of that name, into `out`/NAME.json, and draw them; see :func:`run_parts`."""
     logging.getLogger("skfsink").setLevel(logging.ERROR)  # methods are taken to their limits, where runs would warn
-    store = Store(out / "speed_accuracy.json", "speed_accuracy", fresh)
+    store = Store(out / f"{name}.json", name, fresh)
     with Display(quiet) as display:
-        run_parts(store, [PARTS[only]] if only else list(PARTS.values()), quick, display)
+        run_parts(store, parts, quick, display)
 
 
 def run_parts(store: Store, parts: list[Part], quick: bool, display: Display) -> None:

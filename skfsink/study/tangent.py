@@ -18,7 +18,6 @@ for _name in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
 import json
-import logging
 import shutil
 import subprocess
 import sys
@@ -31,12 +30,10 @@ from cyclopts import Parameter
 
 from ..errors import ConvergenceError, ParameterError
 from ..fem.petsc_matrix import PETSC, check
-from ..run.display import Display
 from .chart import page
 from .part import Part, Planned, Points
 from .rates import observed_rate
-from .speed_accuracy import run_parts
-from .store import Store
+from .speed_accuracy import measure
 
 __all__ = ["TANGENT", "tangent"]
 
@@ -159,10 +156,7 @@ def tangent(*, quick: Annotated[bool, FLAG] = False, fresh: Annotated[bool, FLAG
     quiet
         Show no progress.
     """
-    logging.getLogger("skfsink").setLevel(logging.ERROR)
-    store = Store(out / "tangent.json", "tangent", fresh)
-    with Display(quiet) as display:
-        run_parts(store, [TANGENT], quick, display)
+    measure("tangent", [TANGENT], out, quick, fresh, quiet)
 
 
 if __name__ == "__main__":

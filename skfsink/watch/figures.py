@@ -17,6 +17,7 @@ from ..report.scenes import wave_speeds
 from ..results.frame import Frame, frame_of
 from ..results.history import Table
 from ..results.loader import Frames, Run
+from ..results.stored_series import PACKED, series_index
 from ..scene.scene import Scene
 from ..scene.stored import SCENE
 from .drawn import Drawn
@@ -79,10 +80,8 @@ def own_figures(key: int, seen: Seen, scenes: Scenes) -> list[Figure]:
         return []
     found = []
     for name in ("run", "loading"):
-        index, packed = (run.folder / "series" / f"{name}.{kind}" for kind in ("pvd", "vtkhdf"))
-        if not index.is_file():
-            index = packed
-        if index.is_file() and (index == packed or b"<DataSet" in index.read_bytes()):
+        index = series_index(run.folder / "series", name)
+        if index.is_file() and (index.suffix == PACKED or b"<DataSet" in index.read_bytes()):
             alt = lead + "relative density γ on the deformed body"
             found.append(Figure(f"density-{key}.png", "Relative density", alt, (name, stamp_of(index)),
                                 partial(_density, run, name, scenes, alt)))
