@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import tracemalloc
+from typing import Any
 
 import numpy as np
 import pytest
 import skfem
-from bodies import box, wavy
+from bodies import box, patchy, wavy
 from scipy.sparse import coo_array
 
 import skfsink.fem.kernels.pieces
 import skfsink.fem.space
 import skfsink.fields.pieces
+from skfsink.fem import kernels
 from skfsink.fem.pattern import Pattern
 from skfsink.fem.space import Space
 from skfsink.fields.body import Body
@@ -22,7 +24,7 @@ from skfsink.fields.momentum import Momentum
 from skfsink.fields.pieces import pieces_of
 from skfsink.fields.state import State
 from skfsink.loads.schedule import Loading
-from skfsink.material import AAA, SinkLaw
+from skfsink.material import AAA, MooneyRivlin, SinkLaw
 from skfsink.methods.controls import ExplicitControls
 from skfsink.methods.explicit import Explicit
 
@@ -82,11 +84,35 @@ def test_sums_by_pieces(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
         return [momentum.tangent(pattern, u), momentum.consistent_mass(pattern), *pieces_of(momentum, state)]
 
     whole = found()
-    monkeypatch.setattr(skfsink.fem.kernels.pieces, "PIECE", 5)
+    monkeypatch.setattr(skfsink.fem.kernels.pieces, "PIECE", {2: 5, 3: 5})
     monkeypatch.setattr(skfsink.fem.space, "CHUNK", 5)
     monkeypatch.setattr(skfsink.fields.pieces, "SOME", 5)
     for one, other in zip(found(), whole):
         assert np.array_equal(one, other)
+
+
+@pytest.mark.parametrize("kind", ["quad", "around", "hex"])
+@pytest.mark.parametrize("upper", [False, True])
+def test_second_derivatives_do_not_depend_on_threads(kind: str, upper: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fails if threads change a bit of a tangent, take a piece twice or leave one out: all laws, some elements."""
+    monkeypatch.setattr(kernels.pieces, "PIECE", {2: 5, 3: 5})
+    space = box("quad", 7).revolved() if kind == "around" else box(kind, 3 if kind == "hex" else 7)
+    pattern = Pattern(space, space.dim, np.arange(space.X.size) % 7 > 0, upper=upper)
+    u, gamma, some = wavy(space, 0.1), patchy(space), np.arange(space.n_elements)[3::2]
+    fibres, viscous = np.zeros((some.size, 0, 3)), kernels.Viscous(1e-5, False, 1e6, 1e-3, 0.1, 0.2)
+
+    def found(threads: int) -> list[np.ndarray]:
+        taken: dict[str, Any] = {"elements": some, "threads": threads}
+        both = [kernels.tangent(space, pattern, AAA(), u, gamma, threads=threads),
+                kernels.tangent(space, pattern, AAA(), u, gamma, convex=True, **taken),
+                kernels.tangent_general(space, pattern, MooneyRivlin(), u, gamma, fibres, **taken),
+                kernels.viscous_tangent(space, pattern, viscous, (u, 1e5 * u), gamma, **taken)]
+        if kind == "quad":
+            both.append(kernels.tangent_plane_stress(space, pattern, AAA(), u, gamma, **taken))
+        return both
+
+    for one, shared in zip(found(1), found(3), strict=True):
+        assert one.any() and np.array_equal(one, shared)
 
 
 def test_pieces_are_numbered_by_their_first_elements() -> None:

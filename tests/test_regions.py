@@ -61,7 +61,7 @@ def test_loops_equal_the_forms_of_each_material(kind: str, element: str, monkeyp
 
     Of laws of I1' alone, of more invariants and of fibres in one body; tiles are partly filled, pieces several.
     """
-    monkeypatch.setattr(kernels.pieces, "PIECE", 7)
+    monkeypatch.setattr(kernels.pieces, "PIECE", {2: 7, 3: 7})
     space = box(kind, 16 if kind == "quad" else 3)
     others: list[Material] = [STIFF]
     if element != "planestress":

@@ -60,12 +60,12 @@ class CompiledMomentum:
         material, elements, fibres = part
         if self._plane_stress:
             return kernels.tangent_plane_stress(self._space, pattern, material, u, gamma, convex=convex,
-                                                elements=elements)
+                                                elements=elements, threads=self.tiles.threads)
         if isinstance(material, GeneralMaterial) and fibres is not None:
             return kernels.tangent_general(self._space, pattern, material, u, gamma, fibres, j_bar=self._j_bar,
-                                           convex=convex, elements=elements)
+                                           convex=convex, elements=elements, threads=self.tiles.threads)
         return kernels.tangent(self._space, pattern, material, u, gamma, j_bar=self._j_bar, convex=convex,
-                               elements=elements)
+                               elements=elements, threads=self.tiles.threads)
 
     def mass(self, pattern: Pattern, gamma: np.ndarray) -> np.ndarray:
         """Data of the consistent mass matrix; see :class:`.MomentumBackend`."""
@@ -88,7 +88,7 @@ class CompiledMomentum:
         data = np.zeros(pattern.nnz)
         for law, part in zip(self._viscous, self._parts):
             data += kernels.viscous_tangent(self._space, pattern, law, motion, gamma, compression=compression,
-                                            elements=part.elements)
+                                            elements=part.elements, threads=self.tiles.threads)
         return data
 
 

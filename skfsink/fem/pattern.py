@@ -65,10 +65,10 @@ class Pattern:
         """Those of some elements, (m, nd, nd)."""
         if "slot" in self.__dict__:
             return self.slot[elements]
-        dofs = (self._conn[elements][:, :, None] * self._block + np.arange(self._block)).reshape(
-            -1, self._conn.shape[1] * self._block)
-        found: np.ndarray = np.empty((*dofs.shape, dofs.shape[1]), np.int32)
-        _find_slots(self._number[dofs], self.indptr, self.indices, self.upper, found)
+        conn = self._conn[elements]
+        unknowns = conn.shape[1] * self._block
+        found: np.ndarray = np.empty((len(conn), unknowns, unknowns), np.int32)
+        _find_slots(conn, self._block, self._number, self.indptr, self.indices, self.upper, found)
         if self._absent.size:
             found[np.isin(np.arange(len(self._conn))[elements], self._absent)] = -1
         return found
@@ -95,23 +95,40 @@ def _diagonal(matrix: csr_array) -> csr_array:
     return csr_array((matrix.diagonal(), (np.arange(n), np.arange(n))), shape=(n, n))
 
 
-@njit(cache=True)
-def _find_slots(dofs, indptr, indices, upper, slot):  # type: ignore[no-untyped-def]
-    for e in range(dofs.shape[0]):
-        for i in range(dofs.shape[1]):
-            for j in range(dofs.shape[1]):
-                r, c = dofs[e, i], dofs[e, j]
-                if r < 0 or c < 0 or (upper and c < r):
-                    slot[e, i, j] = -1
+@njit(cache=True, nogil=True)
+def _find_slots(conn, block, number, indptr, indices, upper, slot):  # type: ignore[no-untyped-def]
+    """The columns of a node lie side by side, as far from the end of a row in each row of another node: one search."""
+    slot[:] = -1
+    for e in range(conn.shape[0]):
+        for a in range(conn.shape[1]):
+            first = _first(conn[e, a], block, number)
+            for b in range(conn.shape[1]):
+                column = _first(conn[e, b], block, number)
+                if first < 0 or column < 0 or (upper and column < first):
                     continue
-                low, high = indptr[r], indptr[r + 1] - 1
+                low, high = indptr[first], indptr[first + 1] - 1
                 while low < high:
                     middle = (low + high) // 2
-                    if indices[middle] < c:
+                    if indices[middle] < column:
                         low = middle + 1
                     else:
                         high = middle
-                slot[e, i, j] = low
+                shift = low - indptr[first + 1] - column
+                for i in range(block):
+                    r = number[conn[e, a] * block + i]
+                    for j in range(block):
+                        c = number[conn[e, b] * block + j]
+                        if r >= 0 and c >= 0 and not (upper and c < r):
+                            slot[e, a * block + i, b * block + j] = indptr[r + 1] + shift + c
+
+
+@njit(cache=True)
+def _first(node, block, number):  # type: ignore[no-untyped-def]
+    """The first free unknown of a node, -1 if it has none."""
+    for i in range(block):
+        if number[node * block + i] >= 0:
+            return number[node * block + i]
+    return -1
 
 
 @njit(cache=True)

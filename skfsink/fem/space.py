@@ -378,7 +378,7 @@ def _lump(w, values, conn, N, out):  # type: ignore[no-untyped-def]
             out[conn[e, a]] += total
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _slopes(unit, inverse, out):  # type: ignore[no-untyped-def]
     """out[e, q, a] = unit[q, a] . inverse[e, q]."""
     ne, nq, na, dim = out.shape

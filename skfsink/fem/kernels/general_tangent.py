@@ -23,7 +23,7 @@ from ...system.jit import njit
 from ..pattern import Pattern
 from ..space import Space
 from .lanes import crush_factor
-from .pieces import pieces
+from .pieces import Pieces
 from .records import Solid
 from .tangent import ERSATZ_STIFFNESS, PART, SOFT_GAMMA, parts
 
@@ -32,17 +32,16 @@ __all__ = ["tangent_general"]
 
 def tangent_general(space: Space, pattern: Pattern, material: GeneralMaterial, u: np.ndarray, gamma: np.ndarray,
                     fibres: np.ndarray, *, j_bar: bool = True, convex: bool = False,
-                    elements: np.ndarray | None = None) -> np.ndarray:
+                    elements: np.ndarray | None = None, threads: int = 1) -> np.ndarray:
     """Data of the tangent on `pattern`, as :func:`.tangent.tangent`.
 
     `fibres` (number of `elements`, families, 3) are directions.
     """
-    data, x = np.zeros(pattern.nnz), space.X + u
+    x, law = space.X + u, material.compiled_law.address
     loop = _tangent_around if space.axisymmetric else _tangent_2d if space.dim == 2 else _tangent_3d
     solid = Solid(material.bulk_modulus, material.shear_modulus, j_bar, convex)
-    for piece in pieces(space, pattern, gamma, elements, fibres):
-        loop(material.compiled_law.address, material.constants, solid, x, piece, data)
-    return data
+    pieces = Pieces(space, pattern, np.ascontiguousarray(gamma), elements, fibres)
+    return pieces.assemble(lambda piece, data: loop(law, material.constants, solid, x, piece, data), threads)
 
 
 @njit

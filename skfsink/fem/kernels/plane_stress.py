@@ -37,7 +37,7 @@ from .force2d import (
     points,
 )
 from .lanes import FAST, J_FLOOR, LANES
-from .pieces import pieces
+from .pieces import Pieces
 from .records import Solid
 from .tangent import ERSATZ_STIFFNESS, SOFT_GAMMA
 
@@ -151,17 +151,16 @@ def force_plane_stress(address, constants, volumetric_part, x, elements):  # typ
 
 # --- second derivatives ---
 def tangent_plane_stress(space: Space, pattern: Pattern, material: Material, u: np.ndarray, gamma: np.ndarray,
-                         *, convex: bool = False, elements: np.ndarray | None = None) -> np.ndarray:
+                         *, convex: bool = False, elements: np.ndarray | None = None, threads: int = 1) -> np.ndarray:
     """Data of the tangent on `pattern` at the displacement `u` (n, 2) and Gauss point densities `gamma` (ne, nq).
 
     Its Gauss points are soft as in :func:`.tangent.tangent`. With `convex` no point is unstable. With `elements` it is
     that of these alone.
     """
-    data, x = np.zeros(pattern.nnz), space.X + u
+    x, law = space.X + u, material.compiled_law.address
     solid = Solid(material.bulk_modulus, material.shear_modulus, False, convex)
-    for piece in pieces(space, pattern, gamma, elements):
-        _tangent(material.compiled_law.address, material.constants, solid, x, piece, data)
-    return data
+    pieces = Pieces(space, pattern, np.ascontiguousarray(gamma), elements)
+    return pieces.assemble(lambda piece, data: _tangent(law, material.constants, solid, x, piece, data), threads)
 
 
 @njit(fastmath=FAST)

@@ -31,7 +31,7 @@ from ...system.jit import njit
 from ..pattern import Pattern
 from ..space import Space
 from .lanes import crush_factor
-from .pieces import pieces
+from .pieces import Pieces
 from .records import Solid
 
 __all__ = ["ERSATZ_STIFFNESS", "SOFT_GAMMA", "tangent"]
@@ -41,18 +41,18 @@ SOFT_GAMMA = 1e-3
 
 
 def tangent(space: Space, pattern: Pattern, material: Material, u: np.ndarray, gamma: np.ndarray,
-            *, j_bar: bool = True, convex: bool = False, elements: np.ndarray | None = None) -> np.ndarray:
+            *, j_bar: bool = True, convex: bool = False, elements: np.ndarray | None = None,
+            threads: int = 1) -> np.ndarray:
     """Data of the tangent on `pattern` at the displacement `u` (n, dim) and Gauss point densities `gamma` (ne, nq).
 
     With `convex` the pressure in the geometric part is bounded where it would make a Gauss point unstable. With
-    `elements` it is that of these alone.
+    `elements` it is that of these alone. It does not depend on the number of `threads`.
     """
-    data, x = np.zeros(pattern.nnz), space.X + u
+    x, law = space.X + u, material.compiled_law.address
     loop = _tangent_around if space.axisymmetric else _tangent_2d if space.dim == 2 else _tangent_3d
     solid = Solid(material.bulk_modulus, material.shear_modulus, j_bar, convex)
-    for piece in pieces(space, pattern, gamma, elements):
-        loop(material.compiled_law.address, material.constants, solid, x, piece, data)
-    return data
+    pieces = Pieces(space, pattern, np.ascontiguousarray(gamma), elements)
+    return pieces.assemble(lambda piece, data: loop(law, material.constants, solid, x, piece, data), threads)
 
 
 @njit(fastmath={"contract", "arcp", "nsz"})

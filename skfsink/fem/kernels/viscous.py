@@ -26,7 +26,7 @@ from ..space import Space
 from . import force2d, force3d
 from .hoop import AROUND, add_hoop_force, hoop_stretch, rate_around, ratio_around, viscous_stress
 from .lanes import FAST, J_FLOOR, LANES, LANES_3D, crush_factor
-from .pieces import pieces
+from .pieces import Pieces
 from .records import Viscous
 from .tangent import _cofactor, parts
 
@@ -235,18 +235,17 @@ def viscous_3d(viscous, x, v, elements):  # type: ignore[no-untyped-def]
 
 # --- the derivative with the velocity ---
 def viscous_tangent(space: Space, pattern: Pattern, viscous: Viscous, motion: tuple[np.ndarray, np.ndarray],
-                    gamma: np.ndarray, *, compression: float = 0.0, elements: np.ndarray | None = None) -> np.ndarray:
+                    gamma: np.ndarray, *, compression: float = 0.0, elements: np.ndarray | None = None,
+                    threads: int = 1) -> np.ndarray:
     """Data of the derivative of the viscous force with the velocity on `pattern`; symmetric, and never negative.
 
     `motion` are displacement and velocity (n, dim), `gamma` the densities (ne, nq). Each element counts as compressed
     by -L/c_d min(0, D) = `compression` at least. With `elements` it is that of these alone.
     """
     u, v = motion
-    data = np.zeros(pattern.nnz)
     loop = _tangent_around if space.axisymmetric else _tangent_2d if space.dim == 2 else _tangent_3d
-    for piece in pieces(space, pattern, gamma, elements):
-        loop(viscous, compression, (space.X + u, v), piece, data)
-    return data
+    pieces = Pieces(space, pattern, np.ascontiguousarray(gamma), elements)
+    return pieces.assemble(lambda piece, data: loop(viscous, compression, (space.X + u, v), piece, data), threads)
 
 
 def _make(dim: int, revolved: bool = False) -> Callable[..., Any]:
