@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .space import Space, node_key
+from .graph import node_key
+from .space import Space
 
 __all__ = ["Corner", "alternation", "below", "corner_near", "element_pressure", "greatest_stretch", "inverted",
            "mean_density", "size_near", "turning", "turnings"]

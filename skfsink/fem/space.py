@@ -25,11 +25,12 @@ import skfem
 from scipy.sparse import csr_array
 
 from ..errors import MeshError, place_text
-from ..system.jit import njit
 from .exchange import ALONE, Exchange
+from .graph import adjacency, incidence, node_key
+from .interpolation import at_gauss, lump, slopes
 from .quadrature import AXES, points, shape_functions
 
-__all__ = ["Space", "node_key"]
+__all__ = ["Space"]
 
 CHUNK = 4096    # elements whose geometry is made at a time
 ON_AXIS = 1e-9  # of the size of a body of revolution: x up to which a node is on its axis
@@ -143,7 +144,7 @@ class Space:
         """Gradients of the shape functions Grad N at the Gauss points of some elements [1/mm], (m, nq, na, dim)."""
         inverse = self.invJ[elements]
         found: np.ndarray = np.empty((len(inverse), *self._unit.shape))
-        _slopes(self._unit, inverse, found)
+        slopes(self._unit, inverse, found)
         found.setflags(write=False)
         return found
 
@@ -233,7 +234,7 @@ class Space:
     def at_gauss(self, nodal: np.ndarray) -> np.ndarray:
         """Values (ne, nq) at the Gauss points of the Q1 field with nodal values (n,)."""
         out = np.empty_like(self.w)
-        _at_gauss(np.ascontiguousarray(nodal, float), self.nodes, self.N, out)
+        at_gauss(np.ascontiguousarray(nodal, float), self.nodes, self.N, out)
         return out
 
     def gradient(self, nodal: np.ndarray) -> np.ndarray:
@@ -280,7 +281,7 @@ class Space:
     def lumped(self, values: np.ndarray) -> np.ndarray:
         """The share of this part in these row sums, (n,)."""
         out = np.zeros(self.n_nodes)
-        _lump(self.w, np.ascontiguousarray(values, float), self.nodes, self.N, out)
+        lump(self.w, np.ascontiguousarray(values, float), self.nodes, self.N, out)
         return out
 
     @cached_property
@@ -294,10 +295,7 @@ class Space:
 
         It is made anew each time.
         """
-        start, entry = np.zeros(self.n_nodes + 1, np.int64), np.empty(self.conn.size, np.int64)
-        np.cumsum(np.bincount(self.conn.ravel(), minlength=self.n_nodes), out=start[1:])
-        _place_entries(self.nodes, start[:-1].copy(), entry)
-        return start, entry
+        return incidence(self.nodes, self.n_nodes)
 
     @cached_property
     def outer_faces(self) -> np.ndarray:
@@ -316,114 +314,10 @@ class Space:
     @cached_property
     def graph(self) -> csr_array:
         """Node adjacency: nodes that share an element, symmetric with a full diagonal, (n, n)."""
-        start, entry = self.incidence
-        indptr = np.zeros(self.n_nodes + 1, np.int32)
-        seen = np.full(self.n_nodes, -1, np.int32)
-        _count_neighbours(self.nodes, start, entry, seen, indptr)
-        indices = np.empty(indptr[-1], np.int32)
-        seen[:] = -1
-        _list_neighbours(self.nodes, start, entry, seen, indptr, indices)
-        return csr_array((np.ones(indices.size, np.int8), indices, indptr), shape=(self.n_nodes,) * 2)
+        return adjacency(self.nodes, self.n_nodes)
 
 
 def _jacobians(X: np.ndarray, conn: np.ndarray, dN_ref: np.ndarray) -> Iterator[np.ndarray]:
     """d X/d xi (m, nq, dim, dim) of the elements `conn` (ne, na), :data:`CHUNK` of them at a time."""
     for at in range(0, len(conn), CHUNK):
         yield np.einsum("eai,qak->eqik", X[conn[at:at + CHUNK]], dN_ref)
-
-
-def node_key(nodes: np.ndarray, n: int) -> np.ndarray:
-    """One number for each row of nodes (m, 1 to 4) out of n, in any order; three nodes tell the faces of hexahedra."""
-    ordered = np.sort(nodes, axis=1)[:, :3]
-    key: np.ndarray = ordered @ (n ** np.arange(ordered.shape[1] - 1, -1, -1, dtype=np.int64))
-    return key
-
-
-@njit(cache=True)
-def _at_gauss(nodal, conn, N, out):  # type: ignore[no-untyped-def]
-    if conn.shape[1] == 4:
-        for e in range(conn.shape[0]):
-            x0, x1, x2, x3 = nodal[conn[e, 0]], nodal[conn[e, 1]], nodal[conn[e, 2]], nodal[conn[e, 3]]
-            for q in range(4):
-                out[e, q] = N[q, 0] * x0 + N[q, 1] * x1 + N[q, 2] * x2 + N[q, 3] * x3
-        return
-    x = np.empty(8)
-    for e in range(conn.shape[0]):
-        for a in range(8):
-            x[a] = nodal[conn[e, a]]
-        for q in range(8):
-            total = 0.0
-            for a in range(8):
-                total += N[q, a] * x[a]
-            out[e, q] = total
-
-
-@njit(cache=True)
-def _lump(w, values, conn, N, out):  # type: ignore[no-untyped-def]
-    if conn.shape[1] == 4:
-        for e in range(conn.shape[0]):
-            x0, x1 = w[e, 0] * values[e, 0], w[e, 1] * values[e, 1]
-            x2, x3 = w[e, 2] * values[e, 2], w[e, 3] * values[e, 3]
-            for a in range(4):
-                out[conn[e, a]] += x0 * N[0, a] + x1 * N[1, a] + x2 * N[2, a] + x3 * N[3, a]
-        return
-    x = np.empty(8)
-    for e in range(conn.shape[0]):
-        for q in range(8):
-            x[q] = w[e, q] * values[e, q]
-        for a in range(8):
-            total = 0.0
-            for q in range(8):
-                total += x[q] * N[q, a]
-            out[conn[e, a]] += total
-
-
-@njit(cache=True, nogil=True)
-def _slopes(unit, inverse, out):  # type: ignore[no-untyped-def]
-    """out[e, q, a] = unit[q, a] . inverse[e, q]."""
-    ne, nq, na, dim = out.shape
-    for e in range(ne):
-        for q in range(nq):
-            for a in range(na):
-                for j in range(dim):
-                    total = 0.0
-                    for k in range(dim):
-                        total += unit[q, a, k] * inverse[e, q, k, j]
-                    out[e, q, a, j] = total
-
-
-@njit(cache=True)
-def _place_entries(conn, place, entry):  # type: ignore[no-untyped-def]
-    ne, na = conn.shape
-    for e in range(ne):
-        for a in range(na):
-            node = conn[e, a]
-            entry[place[node]] = e * na + a
-            place[node] += 1
-
-
-@njit(cache=True)
-def _count_neighbours(conn, start, entry, seen, indptr):  # type: ignore[no-untyped-def]
-    na = conn.shape[1]
-    for node in range(seen.size):
-        count = 0
-        for k in range(start[node], start[node + 1]):
-            for other in conn[entry[k] // na]:
-                if seen[other] != node:
-                    seen[other] = node
-                    count += 1
-        indptr[node + 1] = indptr[node] + count
-
-
-@njit(cache=True)
-def _list_neighbours(conn, start, entry, seen, indptr, indices):  # type: ignore[no-untyped-def]
-    na = conn.shape[1]
-    for node in range(seen.size):
-        at = indptr[node]
-        for k in range(start[node], start[node + 1]):
-            for other in conn[entry[k] // na]:
-                if seen[other] != node:
-                    seen[other] = node
-                    indices[at] = other
-                    at += 1
-        indices[indptr[node]:at].sort()

@@ -24,7 +24,8 @@ from scipy.sparse.csgraph import connected_components
 
 from ..errors import ParameterError, place_text, require
 from ..fem.backend import among
-from ..fem.space import Space, node_key
+from ..fem.graph import node_key
+from ..fem.space import Space
 from ..material import Material
 from .body import Body
 from .configurational import PointStress, point_stress
