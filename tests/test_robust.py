@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import time
+import tracemalloc
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -19,10 +20,15 @@ import pytest
 import skfem
 from plates import SMALL, contents, forked, invoke
 
+import skfsink as sk
 import skfsink.run.compute
 import skfsink.run.memory
+from skfsink.errors import ParameterError
+from skfsink.fem.multigrid import Multigrid
+from skfsink.fem.pattern import Pattern
 from skfsink.fem.space import Space
 from skfsink.fields.momentum import Momentum
+from skfsink.material import AAA
 from skfsink.run.checkpoint import load_checkpoint
 from skfsink.run.display import Interrupt
 from skfsink.run.memory import LIMIT, available, estimate, factor_entries
@@ -55,6 +61,42 @@ def test_factor_of_a_cube_grows_as_nested_dissection_does() -> None:
     assert 1.0 < np.log2(entries(32, 32, 2) / entries(16, 16, 2)) / 2 < 1.3
     measured = 186e6 / 8 / 9  # PARDISO's factor of the elastic matrix on 22 x 22 x 22 elements, for 3 x 3 blocks
     assert entries(22, 22, 22) == pytest.approx(measured, rel=0.25)
+
+
+def test_memory_without_factors() -> None:
+    """Fails if the estimate of multigrid is off by half, or is not below that of factors on a thick body."""
+    space = Space(skfem.MeshHex.init_tensor(*[np.linspace(0.0, 1.0, 21)] * 3))
+    free = np.repeat(space.X[:, 1] > 0.0, 3)
+    momentum = Momentum(space, AAA())
+    tracemalloc.start()
+    try:
+        pattern = Pattern(space, 3, free, upper=True)
+        data = momentum.tangent(pattern, np.zeros_like(space.X))
+        multigrid = Multigrid(space, free, pattern)
+        multigrid.factorize(data)
+        multigrid.conjugate(data, np.ones(pattern.size), 1e-2, 5)
+        peak = tracemalloc.get_traced_memory()[1] / 1e9
+    finally:
+        tracemalloc.stop()
+    assert 1 / 1.5 < (estimate(space, linear="multigrid") - estimate(space, statics=False)) / peak < 1.5
+    assert estimate(space, statics=False) < estimate(space, linear="petsc-gamg")
+    thick = Space(skfem.MeshHex.init_tensor(*[np.linspace(0.0, 1.0, 49)] * 3))
+    assert estimate(thick, linear="multigrid") < 0.8 * estimate(thick)
+
+
+def test_multigrid_is_the_cure_where_factors_do_not_fit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fails if a body that fits without factors is not told so, or a plane one, which does not, is."""
+    def told(*counts: int, limit: float) -> str:
+        path = tmp_path / f"{len(counts)}.vtu"
+        sk.write_mesh(path, sk.grid_mesh(*[np.linspace(0.0, 1.0, n + 1) for n in counts]))
+        monkeypatch.setenv(LIMIT, str(limit))
+        with pytest.raises(ParameterError) as caught:
+            sk.custom(mesh=path, grips=[sk.Grip("top", (0, 1e-3)), sk.Grip("bottom", (0, 0))], quiet=True,
+                      out=tmp_path / path.stem)
+        return str(caught.value)
+
+    assert "take linear = 'multigrid', which needs 2.7 GB, or a coarser" in told(40, 40, 40, limit=3.0)
+    assert "multigrid" not in told(30, 30, limit=0.36)
 
 
 def test_more_memory_than_there_is_is_refused(mesh: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -24,14 +24,19 @@ WORTH_SAYING = 1.0  # GB
 PROGRAM = 0.35                       # GB, with its libraries
 PER_ELEMENT = {2: 19e-6, 3: 10e-6}   # GB, fields, matrices, pictures
 FACTORS = 1.25                       # of the matrix of equilibrium: more than one where it is not positive definite too
+MULTIGRID = {2: 5e-6, 3: 26e-6}      # GB, hierarchy and whole matrix in the place of factors, of large bodies
+WITHOUT_FACTORS = "multigrid", "petsc-gamg"  # values of `linear`
 
 
-def estimate(space: Space, statics: bool = True) -> float:
+def estimate(space: Space, statics: bool = True, linear: str = "direct") -> float:
     """Greatest memory [GB] that a run on this mesh takes, of the whole process; without `statics` it has no factors."""
+    bare = float(PROGRAM + PER_ELEMENT[space.dim] * space.n_elements)
     if not statics:
-        return float(PROGRAM + PER_ELEMENT[space.dim] * space.n_elements)
+        return bare
+    if linear in WITHOUT_FACTORS:
+        return bare + MULTIGRID[space.dim] * space.n_elements
     entries = factor_entries(space) if space.dim == 3 else 4.5 * space.n_nodes * np.log2(space.n_nodes)
-    return float(PROGRAM + PER_ELEMENT[space.dim] * space.n_elements + FACTORS * 8e-9 * space.dim**2 * entries)
+    return float(bare + FACTORS * 8e-9 * space.dim**2 * entries)
 
 
 def available() -> float:
@@ -58,11 +63,14 @@ def check_memory(scene: Scene, display: Display) -> None:
         It is more than there is.
     """
     space, there = scene.sample.space, available()
-    needed = estimate(space, scene.event_at > 0.0 or scene.controls.integrator != "explicit")
+    linear, statics = scene.controls.statics.linear, scene.event_at > 0.0 or scene.controls.integrator != "explicit"
+    needed = estimate(space, statics, linear)
     if needed > there:
+        cure = f"take a coarser mesh or a larger machine, or set {LIMIT} to what it may use"
+        if statics and (less := estimate(space, True, "multigrid")) < there:
+            cure = f"take linear = 'multigrid', which needs {less:.1f} GB, or{cure[4:]}"
         raise ParameterError(f"the run will need about {needed:.1f} GB of memory for {space.n_elements} elements, and "
-                             f"there are {there:.1f} GB; take a coarser mesh or a larger machine, or set {LIMIT} to "
-                             f"what it may use")
+                             f"there are {there:.1f} GB; {cure}")
     if needed >= WORTH_SAYING:
         display.say(f"the run will need about {needed:.1f} GB of memory; there are {there:.1f} GB")
 
