@@ -112,7 +112,8 @@ class _Files:
 
     def frames(self, numbers: Sequence[int], cells: Sequence[str] = ()) -> list[Frame]:
         """Some frames, with their labels; each is read once."""
-        labels = {number: WORDS.get(moment, moment) for moment, number in self.moments.items()}
+        words = WORDS if self.scene.event_at == np.inf else WORDS | {"onset": "start"}  # where nothing has failed yet
+        labels = {number: words.get(moment, moment) for moment, number in self.moments.items()}
         quasistatic = self.scene.controls.analysis == "quasistatic"
         for number in numbers:
             if number in self.read:
