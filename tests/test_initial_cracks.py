@@ -18,9 +18,10 @@ from skfsink.errors import Interrupted, MeshError, ParameterError, SkfsinkError
 from skfsink.fem.space import Space
 from skfsink.fields.body import Body
 from skfsink.fields.state import State
-from skfsink.loads.grips import Grip
+from skfsink.loads.grips import Grip, Ramp
 from skfsink.material import AAA, SinkLaw
 from skfsink.meshing.cracks import InitialCrack, crack_along, crack_of_elements
+from skfsink.meshing.grid import grid_mesh
 from skfsink.meshing.sample import Sample, file_sample
 from skfsink.meshing.vtu import write_mesh
 from skfsink.methods.statics import Statics
@@ -78,6 +79,47 @@ def test_a_line_breaks_the_elements_that_it_crosses() -> None:
     x = np.sort(distorted(grid("quad", (20, 20)), 0.2).p[:, distorted(grid("quad", (20, 20)), 0.2).t].mean(axis=1)[0][
         slanting.elements])
     assert x[0] < 0.06 and x[-1] > 0.94 and np.diff(x).max() < 0.06  # no gap
+
+
+def test_a_crack_ends_with_the_element_whose_middle_is_its_end() -> None:
+    """Fails if rounding decides on the last element, or the crack does not say where it ends: at 0.35 of tenths the
+    middle of the fourth element is at 0.35000000000000003."""
+    ten = block(10)
+    for k in range(9):
+        for end, past in ((k + 0.5) / 10, 1), ((k + 0.5 - 1e-4) / 10, 0), ((k + 0.5 + 1e-4) / 10, 1):
+            if k + past == 0:
+                continue
+            crack = crack_along(ten.space, "cut", [(0.0, 0.45), (end, 0.45)], "whole")
+            assert crack.elements.size == k + past
+            assert crack.reach == pytest.approx((0.0, (k + past) / 10))
+            turned = crack_along(ten.space, "cut", [(0.45, 1.0), (0.45, 1.0 - end)], "whole")
+            assert turned.elements.size == k + past
+    corner = crack_along(ten.space, "cut", [(0.0, 0.45), (0.45, 0.45), (0.45, 0.75)], "whole")
+    assert corner.elements.size == 8 and corner.reach == pytest.approx((0.0, 0.8))
+    solid = Space(grid("hex", (10, 3, 3)))
+    for k in range(1, 9):
+        end = (k + 0.5) / 10
+        flat = [(0.0, 0.0, 0.5), (end, 0.0, 0.5), (end, 1.0, 0.5), (0.0, 1.0, 0.5)]
+        assert crack_along(solid, "cut", flat, "whole").elements.size == 3 * (k + 1)
+
+
+def test_a_cut_that_opens_is_no_stretched_body(tmp_path: Path) -> None:
+    """Fails if loading ends because the elements of a cut, which bear nothing, are opened to 30 times their width."""
+    x, y = np.linspace(0, 1, 11), np.concatenate([np.linspace(0, 0.4, 5), np.linspace(0.41, 0.81, 5)])
+    write_mesh(tmp_path / "sheet.vtu", grid_mesh(x, y))
+    sheet = file_sample(tmp_path / "sheet.vtu")
+    narrow = crack_along(sheet.space, "cut", [(0.0, 0.405), (0.5, 0.405)], "whole")
+    pull = Ramp((0.0, 1.0), (0.0, 0.5))
+    of = Scene("sheet", "Sheet", {}, sheet, AAA(c2=0.0), SinkLaw(phi=1e6, length_scale=0.2),
+               (Grip("top", (0.0, pull)), Grip("bottom", (0.0, 0.0))), cracks=(narrow,),
+               controls=Controls(element="planestress"))
+    body = Body.of(of)
+    statics, state = Statics(body, of.controls.statics), body.begin()
+    for _ in statics.load(state):
+        pass
+    ends = [np.argmin(np.linalg.norm(sheet.space.X - (0.0, y), axis=1)) for y in (0.4, 0.41)]
+    opening = float(np.diff(state.u[ends, 1])[0])
+    assert opening > 30 * 0.01 and statics.unfailed == "nothing moves after load time 1 s"
 
 
 def test_a_polygon_breaks_the_elements_around_it() -> None:

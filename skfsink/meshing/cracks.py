@@ -28,12 +28,14 @@ class InitialCrack:
     lips: "broken" as of a crack that has run: the density falls to 0 over the length l beside it; or "whole" as of a
         cut, or of a slit in the mesh.
     extent: length of the line [mm], or area of the surface [mm^2]; None of a set of elements.
+    reach: of a line, from where to where along it its elements reach [mm from the first point]; None of others.
     """
 
     name: str
     elements: np.ndarray
     lips: str
     extent: float | None = None
+    reach: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         choose(f"crack {self.name}: lips", self.lips, LIPS)
@@ -57,7 +59,8 @@ def crack_along(space: Space, name: str, points: Sequence[Sequence[float]], lips
     """The crack along a polyline (plane bodies), or in a flat polygon (bodies in space).
 
     Without a `width` it is as narrow as the mesh allows: the elements that the line or surface crosses, whose middle is
-    beside it and not beyond its ends. With one these, and all whose middle is within half of it.
+    beside it and not beyond its ends; an element whose middle is at an end is taken. With one these, and all whose
+    middle is within half of it.
 
     Parameters
     ----------
@@ -85,7 +88,8 @@ def crack_along(space: Space, name: str, points: Sequence[Sequence[float]], lips
         raise ParameterError(f"crack {name}: no element lies in it; it runs along their edges or leaves the body: the "
                              f"nearest is at {place_text(space.X[space.conn[near]].mean(axis=0))} mm, "
                              f"{space.h[near]:.3g} mm large; give a width of at least that, or points in the body")
-    found = InitialCrack(name, np.flatnonzero(taken), lips, band.extent)
+    elements = np.flatnonzero(taken)
+    found = InitialCrack(name, elements, lips, band.extent, band.reach(elements) if isinstance(band, _Line) else None)
     if width is not None and crossed.any():
         narrow = InitialCrack(name, np.flatnonzero(crossed), lips, band.extent).width(space)
         if narrow is not None and width < narrow * (1 - 1e-6):
@@ -115,7 +119,8 @@ class _Line:
             normal = np.array([-along[1], along[0]])
             height = ((space.X - start) @ normal)[space.conn]
             s = (self._middles - start) @ along
-            mask |= (height.min(axis=1) < -slack) & (height.max(axis=1) > slack) & (s >= 0.0) & (s <= length)
+            mask |= ((height.min(axis=1) < -slack) & (height.max(axis=1) > slack)
+                     & (s >= -slack) & (s <= length + slack))
         return mask | self._at_joints(0.5 * float(space.h.min()))
 
     def within(self, radius: float) -> np.ndarray:
@@ -130,6 +135,13 @@ class _Line:
             s, height = arm @ along, np.abs(arm @ np.array([-along[1], along[0]]))
             np.minimum(least, np.where((s >= -1e-9 * length) & (s <= length * (1 + 1e-9)), height, np.inf), out=least)
         return least
+
+    def reach(self, elements: np.ndarray) -> tuple[float, float]:
+        """From where to where along the line, lengthened beyond its ends, elements reach [mm]."""
+        X = self.space.X[self.space.conn[elements]].reshape(-1, self.space.dim)
+        first = float(((X - self._starts[0]) @ self._along[0]).min())
+        last = float(((X - self._starts[-1]) @ self._along[-1]).max())
+        return first, float(self._lengths[:-1].sum()) + last
 
     def _at_joints(self, radius: float) -> np.ndarray:
         near = np.zeros(self.space.n_elements, bool)
@@ -155,14 +167,24 @@ class _Polygon:
         self._middles = self._nodes[space.conn].mean(axis=1)
 
     def _over(self) -> np.ndarray:
-        """Mask (ne,) of the elements whose middle is above or below it: a ray crosses its sides oddly often."""
+        """Mask (ne,) of the elements whose middle is above or below it: a ray crosses its sides oddly often, or it is
+        over a side."""
         px, py = self._middles[:, 0], self._middles[:, 1]
         odd = np.zeros(len(px), bool)
         for a, b in zip(self._flat, np.roll(self._flat, -1, axis=0)):
             if a[1] != b[1]:
                 between = (a[1] > py) != (b[1] > py)
                 odd ^= between & (px < a[0] + (py - a[1]) / (b[1] - a[1]) * (b[0] - a[0]))
-        return odd
+        return odd | (self._from_sides() <= _SLIGHT * self.space.h)
+
+    def _from_sides(self) -> np.ndarray:
+        """Distance of the middles, put into the plane, from the nearest side [mm], (ne,)."""
+        least = np.full(len(self._middles), np.inf)
+        for a, b in zip(self._flat, np.roll(self._flat, -1, axis=0)):
+            side, arm = b - a, self._middles[:, :2] - a
+            share = np.clip(arm @ side / max(float(side @ side), 1e-300), 0.0, 1.0)
+            np.minimum(least, np.linalg.norm(arm - share[:, None] * side, axis=1), out=least)
+        return least
 
     def crossed(self) -> np.ndarray:
         """Mask (ne,) of the elements that its plane crosses, with their middle above or below it."""
