@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +15,8 @@ from guarded import Stop, simulation
 from plates import deck, plate
 from test_loads import TOUGH, Loaded, rollers, scene, side
 
-from skfsink.errors import Interrupted, ParameterError
+import skfsink
+from skfsink.errors import CheckpointError, Interrupted, OutputError, ParameterError
 from skfsink.fem.space import Space
 from skfsink.fields.body import Body
 from skfsink.fields.density import DensitySolver
@@ -379,5 +381,35 @@ def test_a_curve_is_made_in_python(tmp_path: Path) -> None:
     other = replace(made, grips=(Grip("top", (0.0, curve)), made.grips[1]))
     assert made_in_python(made, find_case("custom")) == ()
     assert made_in_python(other, find_case("custom")) == ("grips",)
-    with pytest.raises(ParameterError, match=r"^grip top, y: a function of the time stands in no deck"):
-        read_tables("grips", other.grips)
+    assert read_tables("grips", other.grips)[0]["y"] is curve
+    with pytest.raises(ParameterError, match=r"^pressure top, value takes no function of the time, as x, y and z of"):
+        read_tables("pressures", [{"boundary": "top", "value": curve}])
+
+
+def swung(t: float) -> float:
+    """A displacement [mm] that swings once and rises."""
+    return float(0.02 * t + 0.01 * np.sin(2 * np.pi * t))
+
+
+def test_custom_takes_a_curve(tmp_path: Path) -> None:
+    """Fails if the function `custom` refuses a curve, moves the grip by its polyline, or goes on with another one."""
+    write_mesh(tmp_path / "plate.vtu", plate())
+    still = {"boundary": "bottom", "x": 0, "y": 0}
+    asked = {"mesh": tmp_path / "plate.vtu", "phi": 10.0, "length_scale": 1.0, "quiet": True}
+    curve = Curve(swung, 2.0, tolerance=0.05)
+    given = [{"boundary": "top", "x": 0, "y": curve}, still]
+    made = skfsink.custom.scene(**{**asked, "grips": given})
+    assert made.grips[0].velocity[1] is curve and made_in_python(made, find_case("custom")) == ("grips",)
+    points = made.parameters["grips"][0]["y"]
+    assert points[-1] == [2.0, swung(2.0)] and len(points) < 100
+    folder = tmp_path / "run"
+    run = skfsink.custom(**asked, grips=given, out=folder)
+    time, way = run.history["time_s"], run.history["grip_displacement_mm"]
+    np.testing.assert_allclose(way, [swung(t) for t in time], rtol=1e-12)
+    assert time[-1] == 2.0 and skfsink.load(folder).made_in_python == ("grips",)
+    with pytest.raises(OutputError, match=re.escape("resume it from there, with grips=…, the same")):
+        skfsink.custom(**asked, resume=folder)
+    again = skfsink.custom(**asked, grips=given, resume=folder)
+    np.testing.assert_array_equal(again.history["reaction_N_per_mm"], run.history["reaction_N_per_mm"])
+    with pytest.raises(CheckpointError, match="scene"):
+        skfsink.custom(**asked, grips=[{**given[0], "y": Curve(swing, 2.0)}, still], resume=folder)

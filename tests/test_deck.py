@@ -260,6 +260,25 @@ def test_ten_thousand_variants(tmp_path: Path, content: bytes, place: int, case:
     check_table(tmp_path, case, table)
 
 
+def test_a_deck_runs_with_other_parameters(tmp_path: Path) -> None:
+    """Fails if what Python changes of a deck is dropped or refused: a mesh, text with a unit, tables, a function."""
+    for n in (9, 13):
+        write_mesh(tmp_path / f"{n}.vtu", plate(n))
+    read = read_deck(deck(tmp_path, 'case = "custom"\n[parameters]\nmesh = "9.vtu"\nlength_scale = "0.6 mm"\n'
+                                    '[[grips]]\nboundary = "top"\ny = 1\n[[grips]]\nboundary = "bottom"\ny = 0\n'))
+    grips = [{"boundary": "top", "x": 0, "y": "2 mm/s"}, {"boundary": "bottom", "x": 0, "y": 0}]
+    scene = read.scene(mesh=tmp_path / "13.vtu", phi="200 kPa", grips=grips)
+    assert scene.sample.space.n_elements > 13 * 12 and scene.sink_law.phi == 0.2
+    assert scene.grips[0].velocity == (0.0, 2.0) and read.scene().grips[0].velocity == (None, 1.0)
+    run = read.run(mesh=str(tmp_path / "13.vtu"), phi="0.2 MPa", grips=grips, stop=lambda view: "far enough",
+                   out=tmp_path / "run", quiet=True)
+    assert run.summary["elements"] == scene.sample.space.n_elements and "far enough" in run.summary["end"]
+    assert load(tmp_path / "run").parameters["phi"] == 0.2
+    with pytest.raises(ParameterError, match="phi must be"):
+        read.run(phi="3 mm", out=tmp_path / "no")
+    assert read.changed(m=8).parameters["m"] == 8 and "m" not in read.parameters
+
+
 # --- the program ---
 @pytest.mark.slow
 def test_run_and_resume_from_a_deck(tmp_path: Path) -> None:

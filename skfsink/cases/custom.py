@@ -28,6 +28,7 @@ from ..scene.tables import (
     body_forces_of,
     cracks_of,
     grips_of,
+    in_points,
     pressures_of,
     read_tables,
     regions_of,
@@ -80,9 +81,11 @@ def custom(
         Distance within which nodes of the mesh become one [mm]; 0 leaves them apart. A mesh in pieces is refused.
     grips
         Boundaries that are held or moved: for x, y, z a velocity, or a ramp of points [time, displacement]; a
-        component left out is free. The load is the force on the first one that moves.
+        component left out is free. The load is the force on the first one that moves. From Python also a
+        :class:`.Curve`, a function of the load time.
     tractions
-        Dead loads on boundaries, per undeformed area: for x, y, z a rate, or a ramp of points [time, traction].
+        Dead loads on boundaries, per undeformed area: for x, y, z a rate, or a ramp of points [time, traction]. From
+        Python also a :class:`.Curve`.
     pressures
         Pressures on boundaries, which follow the deformed surface: a value, which is reached in the first second of
         load time, or a ramp of points [time, pressure]; or a rate. With `in_crack` they act in cracks from it as well.
@@ -153,8 +156,10 @@ def _scene(arguments: dict[str, Any], options: Options) -> Scene:
     rho0 = by_element(sample.space.n_elements, material.rho0, regions, lambda region: region.material.rho0)
     weights = tuple(partial(BodyForce, rho0=rho0, rate=rate, elements=sample.elements(name) if name else None)
                     for name, rate in body_forces_of(arguments.get("body_forces", ()), dim))
+    written = {name: in_points(arguments[name]) for name in ("grips", "tractions")}
     return Scene(
-        case="custom", title=arguments["title"], parameters={**arguments, **options.parameters()}, sample=sample,
+        case="custom", title=arguments["title"], sample=sample,
+        parameters={**arguments, **written, **options.parameters()},
         material=material, sink_law=sink_law, controls=options.controls(), regions=regions,
         grips=grips_of(arguments["grips"], dim),
         tractions=tractions_of(arguments["tractions"], dim), loads=weights, pressures=pressures,
