@@ -10,6 +10,7 @@ import shutil
 import subprocess
 import sys
 import time
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -134,7 +135,7 @@ def test_every_combination_once_a_table_and_a_picture(deck: Path, tmp_path: Path
     (out / "phi=0.17,notch_width=0.1").mkdir(parents=True)
     (out / "phi=0.17,notch_width=0.1" / "run").write_text("in the way")  # the folder of the third cannot be made
     status, err, _ = invoke_program(*arguments, "--jobs", 2)
-    assert (status, err) == (0, "")
+    assert status == 2 and err.startswith("skfsink: 1 of 3 runs of the sweep failed, first phi=0.17,notch_width=0.1: ")
     rows = table(out)
     assert [(row["phi"], row["folder"]) for row in rows] == [
         (phi, f"phi={phi},notch_width=0.1") for phi in ("0.15", "0.16", "0.17")]
@@ -160,6 +161,29 @@ def test_mistakes_are_found_before_anything_is_made(deck: Path, tmp_path: Path) 
     assert status == 2
     assert "phi must be" in err and err.count("\n") == 1
     assert not (tmp_path / "sweep").exists()
+
+
+def test_failed_runs_are_warned_of(tmp_path: Path) -> None:
+    """Fails if Python gets rows without results in silence, or values by name are others than those of a text."""
+    write_mesh(tmp_path / "a.vtu", plate())
+    path = tmp_path / "sheet.toml"
+    path.write_text('case = "custom"\n[parameters]\nmesh = "a.vtu"\nlength_scale = "0.6 mm"\nphi = "9 MPa"\n'
+                    'stop = "displacement > 1e-3 mm"\n[[grips]]\nboundary = "top"\ny = 1\n'
+                    '[[grips]]\nboundary = "bottom"\ny = 0\n')
+    said = r"^1 of 2 runs of the sweep failed, first m=9,mesh=no.vtu: there is no mesh file .*no.vtu; they are rows"
+    with pytest.warns(UserWarning, match=said):
+        rows = run_sweep(str(path), {"m": [9], "mesh": ["a.vtu", "no.vtu"]}, str(tmp_path / "out"), quiet=True)
+    assert [(row["m"], row["mesh"], bool(row["failure"])) for row in rows] == [
+        (9.0, "a.vtu", False), (9.0, "no.vtu", True)]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        again = run_sweep(path, ["m=9", "mesh=a.vtu"], tmp_path / "out", quiet=True)
+    assert again == rows[:1]
+    status, err, _ = invoke_program("sweep", path, "--vary", "mesh=no.vtu", "--out", tmp_path / "no", "--quiet")
+    assert status == 2 and err.startswith("skfsink: 1 of 1 runs of the sweep failed") and err.count("\n") == 1
+    assert len(table(tmp_path / "no")) == 1
+    with pytest.raises(ParameterError, match="m varies over a list of values; got '9'"):
+        run_sweep(path, {"m": "9"}, tmp_path / "never")
 
 
 def test_picture_of_an_ensemble(tmp_path: Path) -> None:
