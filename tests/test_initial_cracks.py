@@ -20,7 +20,7 @@ from skfsink.fields.body import Body
 from skfsink.fields.state import State
 from skfsink.loads.grips import Grip, Ramp
 from skfsink.material import AAA, SinkLaw
-from skfsink.meshing.cracks import InitialCrack, crack_along, crack_of_elements
+from skfsink.meshing.cracks import InitialCrack, crack_along, crack_of_elements, of_length
 from skfsink.meshing.grid import grid_mesh
 from skfsink.meshing.sample import Sample, file_sample
 from skfsink.meshing.vtu import write_mesh
@@ -101,6 +101,20 @@ def test_a_crack_ends_with_the_element_whose_middle_is_its_end() -> None:
         end = (k + 0.5) / 10
         flat = [(0.0, 0.0, 0.5), (end, 0.0, 0.5), (end, 1.0, 0.5), (0.0, 1.0, 0.5)]
         assert crack_along(solid, "cut", flat, "whole").elements.size == 3 * (k + 1)
+
+
+def test_the_length_of_a_line() -> None:
+    """Fails if a line of a given length ends elsewhere, or turns at another place, cut short or lengthened."""
+    way = [(0.0, 0.5), (0.3, 0.5), (0.3, 0.5), (0.3, 0.9)]
+    for length, end in (0.2, (0.2, 0.5)), (0.3, (0.3, 0.5)), (0.5, (0.3, 0.7)), (0.7, (0.3, 0.9)), (0.8, (0.3, 1.0)):
+        line = of_length(way, length)
+        np.testing.assert_allclose(line[-1], end, atol=1e-12)
+        assert np.linalg.norm(np.diff(line, axis=0), axis=1).sum() == pytest.approx(length)
+        assert length <= 0.3 or line[1] == [0.3, 0.5]
+    table = {"name": "c", "points": [[0.0, 0.5], [0.2, 0.5]], "lips": "whole"}
+    short, longer = (cracks_of([{**table, "length": length}], BLOCK)[0] for length in (0.1, "400 um"))
+    assert (short.extent, longer.extent) == pytest.approx((0.1, 0.4))
+    assert np.isin(short.elements, longer.elements).all() and longer.elements.size == slit("whole").elements.size
 
 
 def test_a_cut_that_opens_is_no_stretched_body(tmp_path: Path) -> None:
@@ -310,6 +324,8 @@ def test_cracks_of_a_deck(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
     ({"lips": "whole"}, "crack c needs points or elements, the name of a set of them"),
     ({"lips": "whole", "points": [[3, 2], [4, 2]], "elements": "x"}, "crack c needs points or elements, the name"),
     ({"lips": "whole", "elements": "x", "width": 1.0}, "crack c: width is for points"),
+    ({"lips": "whole", "elements": "x", "length": 1.0}, "crack c: length is for points"),
+    ({"lips": "whole", "points": [[3, 2], [4, 2]], "length": 0}, "crack c: length must be a finite number in (0"),
     ({"lips": "whole", "elements": "x"}, "mesh plate has no set of elements 'x'"),
     ({"lips": "whole", "points": [[3, 2], [4, 2]], "width": 0}, "crack c: width must be a finite number in (0"),
     ({"lips": "whole", "points": [[3, 2], [4]]}, "crack c, points: a point must be 2 or 3 coordinates"),

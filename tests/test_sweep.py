@@ -95,6 +95,18 @@ def test_constants_of_laws_vary(text: str, name: str, unit: str, values: list[fl
     assert LAYERS.parameters == before
 
 
+def test_the_length_of_a_crack_varies() -> None:
+    """Fails if a sweep cannot change how long a crack of the deck is, by its name or as the only one."""
+    cut = {"name": "cut", "points": [[0.0, 1.0], [2.0, 1.0]], "lips": "whole"}
+    deck = Deck("custom", {"mesh": "a.vtu", "cracks": (cut,)})
+    for name in "cut.length", "cracks.length":
+        found = read_variation(f"{name}=1 mm..3 mm:3", deck)
+        assert (found.what.unit, found.values) == ("mm", [1.0, 2.0, 3.0])
+        assert with_values([found], {name: 3.0}, deck.parameters)["cracks"] == ({**cut, "length": 3.0},)
+    with pytest.raises(ParameterError, match="numbers of cracks are width, length"):
+        read_variation("cut.points=1,2", deck)
+
+
 @pytest.mark.parametrize(("text", "said"), [
     ("mu=1,2", "constants of hgo are c, k1, k2, kappa, angle, axis, normal"), ("axis=1,2", "it is a vector"),
     ("core.1.k2=1,2", "numbers of regions are phi, m, bulk_modulus, density, viscosity"),

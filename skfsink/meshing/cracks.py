@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import ParameterError, choose, place_text
 from ..fem.space import Space
 
-__all__ = ["LIPS", "InitialCrack", "crack_along", "crack_of_elements"]
+__all__ = ["LIPS", "InitialCrack", "crack_along", "crack_of_elements", "of_length"]
 
 LIPS = ("broken", "whole")
 FLAT = 1e-6   # of its size: how far the corners of a polygon may be from its plane
@@ -96,6 +96,20 @@ def crack_along(space: Space, name: str, points: Sequence[Sequence[float]], lips
             raise ParameterError(f"crack {name}: width {width:.3g} mm is less than the mesh allows there, "
                                  f"{narrow:.3g} mm: the elements that it crosses; leave width out, or refine the mesh")
     return found
+
+
+def of_length(points: Sequence[Sequence[float]], length: float) -> list[list[float]]:
+    """The polyline that begins as `points` (m, dim) and is `length` [mm] long: cut short, or lengthened straight on."""
+    corners, left = [np.asarray(points[0], float)], length
+    for number, point in enumerate(points[1:], 2):
+        arm = np.asarray(point, float) - corners[-1]
+        size = float(np.linalg.norm(arm))
+        if size > 0.0 and (size >= left or number == len(points)):
+            corners.append(corners[-1] + arm * (left / size))
+            break
+        corners.append(np.asarray(point, float))
+        left -= size
+    return [corner.tolist() for corner in corners]
 
 
 class _Line:

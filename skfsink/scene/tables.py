@@ -29,7 +29,7 @@ from ..loads.pressure import Filling, Pressure
 from ..loads.rotation import Rotation
 from ..material import MATERIALS, own_constants
 from ..material.regions import RegionLaw, one_bulk_modulus
-from ..meshing.cracks import InitialCrack, crack_along, crack_of_elements
+from ..meshing.cracks import InitialCrack, crack_along, crack_of_elements, of_length
 from ..meshing.sample import Sample
 from ..units import Unit, kind_and_unit
 from .course_file import SUFFIX
@@ -75,7 +75,7 @@ TYPES: Mapping[str, Mapping[str, Any]] = {
                "axis": Annotated[list, Vector("")], "centre": Annotated[list, Vector("mm")],
                "normal": Annotated[list, Vector("")]},
     "cracks": {"name": str, "points": Annotated[list, Way()], "lips": str, "width": Annotated[float, Unit("mm")],
-               "elements": str}}
+               "length": Annotated[float, Unit("mm")], "elements": str}}
 #: kinds whose first field may be left out: they are of the whole body then
 WITHOUT_NAME = ("body_forces", "velocities", "fibres")
 #: fields of a table that may not be left out, where these are others than the first
@@ -274,9 +274,16 @@ def _crack(table: Mapping[str, Any], sample: Sample) -> InitialCrack:
     if "elements" in table:
         if "width" in table:
             raise ParameterError(f"crack {name}: width is for points; a set of elements is as wide as it is")
+        if "length" in table:
+            raise ParameterError(f"crack {name}: length is for points; a set of elements is as long as it is")
         return crack_of_elements(sample.space, name, sample.elements(table["elements"]), lips)
     width = table.get("width")
-    return crack_along(sample.space, name, table["points"], lips,
+    points = table["points"]
+    if "length" in table:
+        if sample.space.dim == 3:
+            raise ParameterError(f"crack {name}: length is for a line in the plane; a surface has its points")
+        points = of_length(points, require(f"crack {name}: length", table["length"], "mm", low=0, low_open=True))
+    return crack_along(sample.space, name, points, lips,
                        None if width is None else require(f"crack {name}: width", width, "mm", low=0, low_open=True))
 
 
