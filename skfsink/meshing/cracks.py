@@ -29,6 +29,7 @@ class InitialCrack:
         cut, or of a slit in the mesh.
     extent: length of the line [mm], or area of the surface [mm^2]; None of a set of elements.
     reach: of a line, from where to where along it its elements reach [mm from the first point]; None of others.
+    tips: of a line, where it ends there and in which direction it points: place [mm] and unit vector of each end.
     """
 
     name: str
@@ -36,6 +37,7 @@ class InitialCrack:
     lips: str
     extent: float | None = None
     reach: tuple[float, float] | None = None
+    tips: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
 
     def __post_init__(self) -> None:
         choose(f"crack {self.name}: lips", self.lips, LIPS)
@@ -89,7 +91,8 @@ def crack_along(space: Space, name: str, points: Sequence[Sequence[float]], lips
                              f"nearest is at {place_text(space.X[space.conn[near]].mean(axis=0))} mm, "
                              f"{space.h[near]:.3g} mm large; give a width of at least that, or points in the body")
     elements = np.flatnonzero(taken)
-    found = InitialCrack(name, elements, lips, band.extent, band.reach(elements) if isinstance(band, _Line) else None)
+    line = band if isinstance(band, _Line) else None
+    found = InitialCrack(name, elements, lips, band.extent, *(() if line is None else line.ends(elements)))
     if width is not None and crossed.any():
         narrow = InitialCrack(name, np.flatnonzero(crossed), lips, band.extent).width(space)
         if narrow is not None and width < narrow * (1 - 1e-6):
@@ -150,12 +153,16 @@ class _Line:
             np.minimum(least, np.where((s >= -1e-9 * length) & (s <= length * (1 + 1e-9)), height, np.inf), out=least)
         return least
 
-    def reach(self, elements: np.ndarray) -> tuple[float, float]:
-        """From where to where along the line, lengthened beyond its ends, elements reach [mm]."""
+    def ends(self, elements: np.ndarray
+             ) -> tuple[tuple[float, float], tuple[tuple[np.ndarray, np.ndarray], ...]]:
+        """From where to where along the line, lengthened beyond its ends, elements reach [mm]; the places of these two
+        ends and the directions that the line has there."""
         X = self.space.X[self.space.conn[elements]].reshape(-1, self.space.dim)
         first = float(((X - self._starts[0]) @ self._along[0]).min())
         last = float(((X - self._starts[-1]) @ self._along[-1]).max())
-        return first, float(self._lengths[:-1].sum()) + last
+        tips = ((self._starts[0] + first * self._along[0], -self._along[0]),
+                (self._starts[-1] + last * self._along[-1], self._along[-1]))
+        return (first, float(self._lengths[:-1].sum()) + last), tips
 
     def _at_joints(self, radius: float) -> np.ndarray:
         near = np.zeros(self.space.n_elements, bool)
