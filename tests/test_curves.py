@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -31,6 +31,7 @@ from skfsink.methods.explicit import Explicit
 from skfsink.methods.hht import HHT
 from skfsink.run.display import Display
 from skfsink.run.simulate import Simulation
+from skfsink.run.unreached import unreached
 from skfsink.scene.deck import read_deck
 from skfsink.scene.described import made_in_python
 from skfsink.scene.registry import find_case
@@ -341,6 +342,24 @@ def written(folder: Path, course: str) -> Path:
     """A deck with a course of its upper grip, beside the mesh of the small plate."""
     write_mesh(folder / "plate.vtu", plate())
     return deck(folder, HEAD + GRIPS.format(course))
+
+
+def test_cycles_that_an_event_does_not_come_to(tmp_path: Path) -> None:
+    """Fails if cycles after the onset are dropped without a word, or a ramp that only goes on, or rests, is one."""
+    made = read_deck(written(tmp_path, '"1 um/s"')).scene()
+    quasi = replace(made, controls=replace(made.controls, analysis="quasistatic"))
+
+    def said(times: Sequence[float], values: Sequence[float], of: Any = quasi, end: float = 1.5) -> str:
+        grip = Grip("top", (0.0, Ramp(tuple(times), tuple(values))))
+        return unreached(replace(of, grips=(grip, made.grips[1])), 1.5, end)
+
+    assert unreached(made, 1.5, 1.5) == ""
+    text = said((0, 1, 2, 3, 4), (0, 1, 2, 0, 2))
+    assert "turns at load time 2 s, which this run does not come to: it begins to fail at 1.5 s, and a quasi-" in text
+    assert "turns at load time 3 s" in said((0, 2, 3, 4), (0, 1, 1, 0))
+    assert said((0, 1, 2), (0, 1, 3)) == said((0, 1, 2, 3), (0, 1, 2, 5)) == said((0, 1, 2, 3), (0, 1, 2, 2)) == ""
+    assert said((0, 2, 3), (0, 1, 0), end=2.5) == ""
+    assert "the event lasts 0.1 s" in said((0, 2, 3), (0, 1, 0), made, 1.6)
 
 
 def test_points_of_a_deck_in_a_file(tmp_path: Path) -> None:

@@ -219,7 +219,7 @@ def test_rate_of_an_initial_crack_at_the_onset(crack: dict[str, Any], lips: str,
         cracks=[{"name": "slit", "lips": lips, **crack}], probes=[{"name": "tear", "kind": "release_rate", "every": 1}])
     rates = load_release(run.folder / "release.csv")
     s = 1 + run.summary["onset"]["displacement_mm"] / 2
-    assert list(rates["phase"])[0] == "onset" and list(rates["note"])[0] == ""
+    assert rates["phase"][0] == "onset" and rates["note"][0] == ""
     assert rates["x_mm"][0] == pytest.approx(4.0)
     assert rates["G_N_per_mm"][0] == pytest.approx(2 * 0.5 * (s**2 + s**-2 - 2), rel=off)
 
