@@ -40,6 +40,11 @@ from ..units import Unit
 __all__ = ["custom"]
 
 IN_A_DECK = Parameter(parse=False)
+#: what to ask for in the place of a model
+INSTEAD = {"onset": 'event_time = "1 ns" ends the run at the onset', "statics": 'take analysis = "quasistatic"',
+           "dynamics": "leave it out", "full": 'take start = "rest"'}
+#: of the shared parameters: those for the cases of the paper alone
+REFUSED = ("model", "tolerance", "quantity", "half", "dimensions", "mesh_layout", "speed")
 
 
 @case_function
@@ -119,7 +124,9 @@ def custom(
         Summary, history and last state; its files are in the output folder.
     """
     if check_options(options).model:
-        raise ParameterError(f"model is for the cases of the paper, whose models were measured; got {options.model!r}")
+        cure = INSTEAD.get(options.model, "analysis, integrator and start say what is computed")
+        raise ParameterError(f"model is for the cases of the paper, whose models were measured; got {options.model!r}: "
+                             f"{cure}")
     if not isinstance(faces, str):
         raise ParameterError(f"faces must be text, names of boundaries with commas, such as 'back, front'; got "
                              f"{faces!r:.80}")
@@ -168,7 +175,7 @@ def _scene(arguments: dict[str, Any], options: Options) -> Scene:
         faces=tuple(filter(None, (name.strip() for name in arguments["faces"].split(",")))))
 
 
-CASE = Case(custom, _scene)
+CASE = Case(custom, _scene, REFUSED)
 
 if __name__ == "__main__":
     from ..cli.program import command

@@ -24,7 +24,7 @@ def notch_tip(space: Space, node: int, within: float, left_out: Sequence[np.ndar
     0 there, in which the flanks of a notch cancel; at the tip of a slit, where all does, it is away from the faces.
     Faces all of whose nodes are in one of `left_out`, as planes of symmetry, are no surface. `mirrored` are the
     normals (axes) of planes of symmetry that the notch is cut by: there is as much of it behind. `gone` are the numbers
-    of elements that the body has not, as those of an initial crack. None where there is no surface within three elements.
+    of elements that the body has not, as those of an initial crack. None where no surface is within three elements.
     """
     element, face = np.nonzero(space.outer_faces if gone is None or not gone.size else space.faces_without(gone))
     nodes = space.conn[element[:, None], space.face_corners[face]]

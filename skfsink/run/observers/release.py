@@ -29,9 +29,9 @@ class EnergyRelease(Observer):
 
     A tip is one of the tracker's that advances; its direction is that of the last 3 l of its crack. At the onset it is
     the notch, or the initial crack, at which the body begins to fail. On a plane of symmetry along the crack, G is that
-    of the whole body. In 3D the front runs through the sheet, from one of its `faces` to the other. A row without a G says
-    in `note` why. G scatters, as elements fail one by one and gamma is solved for at intervals; its mean over the last
-    4 l/c_s is beside it. The history of the run has the greatest G of a look, and the speed of that tip.
+    of the whole body. In 3D the front runs through the sheet, from one of its `faces` to the other. A row without a G
+    says in `note` why. G scatters, as elements fail one by one and gamma is solved for at intervals; its mean over the
+    last 4 l/c_s is beside it. The history of the run has the greatest G of a look, and the speed of that tip.
 
     Memory: the rows so far, the last places of each tip, which tell its speed, and when it last looked; `greatest` is
     of that look.
