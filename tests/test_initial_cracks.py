@@ -13,7 +13,9 @@ import pytest
 from bodies import distorted, grid, same_bits
 from guarded import Stop, simulation
 from plates import contents, deck, invoke_program, plate
+from scipy.optimize import brentq
 
+import skfsink
 from skfsink.errors import Interrupted, MeshError, ParameterError, SkfsinkError
 from skfsink.fem.space import Space
 from skfsink.fields.body import Body
@@ -355,3 +357,46 @@ def test_bodies_in_space(tmp_path: Path) -> None:
         found.append(onset(of)[0])
     assert found[0].grip == found[1].grip
     assert found[0].ledger.elastic == pytest.approx(found[1].ledger.elastic, rel=1e-6)
+
+
+@pytest.mark.slow
+def test_trousers_of_rivlin_and_thomas(tmp_path: Path) -> None:
+    """Fails if loading ends as the narrow cut opens, or the J integral of long legs, which are bent by 90 degrees, is
+    not 2 F s/t - w W, with the stretch s of the legs and their energy density W by the force F; w is both widths.
+
+    The legs of 15 mm are not endless: they bend in part of their length, for which 3 % are allowed.
+    """
+    leg, thick, gap, cut = 6.0, 1.0, 0.2, 15.0
+    c1, c2, c3 = 0.2136, -0.00511, 0.000345
+    side = np.linspace(0.0, leg, 7)
+    mesh = grid_mesh(np.linspace(0, 30, 31), [*side, *(leg + gap + side)], np.linspace(0, thick, 3))
+    x, y, _ = mesh.points.T
+    mesh.point_sets = {"upper": np.flatnonzero((x == 0) & (y > leg + 0.1)), "lower": np.flatnonzero(
+        (x == 0) & (y < leg + 0.1))}
+    write_mesh(tmp_path / "sheet.vtu", mesh)
+    middle = leg + gap / 2
+    rates: list[tuple[float, float]] = []
+
+    class Rate(skfsink.Observer):
+        def loading(self, view: Any) -> None:
+            rates.append((view.load, skfsink.energy_release_rate(
+                view.body, view.state, (cut, middle, thick / 2), [1, 0, 0], 3.5, front=[0, 0, 1]).G))
+
+    run = skfsink.custom(
+        mesh=tmp_path / "sheet.vtu", material="yeoh", constants=f"c1 = {c1}, c2 = {c2}, c3 = {c3}", phi=30.0,
+        length_scale=1.5, observers=[Rate()], out=tmp_path / "run", quiet=True,
+        cracks=[{"name": "cut", "lips": "whole", "points": [[0, middle, 0], [cut, middle, 0], [cut, middle, thick],
+                                                            [0, middle, thick]]}],
+        grips=[{"boundary": "upper", "y": 0, "z": [[0, 0], [1, 18]]}, {"boundary": "right", "x": 0, "y": 0, "z": 0},
+               {"boundary": "lower", "y": 0, "z": [[0, 0], [1, -18]]}])
+    force, G = rates[-1]
+    assert run.history["grip_displacement_mm"][-1] == pytest.approx(36.0)
+
+    def stress(s: float) -> float:
+        z = s**2 + 2 / s - 3
+        return 2 * (s - s**-2) * (c1 + 2 * c2 * z + 3 * c3 * z**2)
+
+    s = brentq(lambda s: stress(s) - force / (leg * thick), 1.0, 2.0)
+    z = s**2 + 2 / s - 3
+    assert 1.05 < s < 1.1
+    assert pytest.approx(2 * force * s / thick - 2 * leg * (c1 * z + c2 * z**2 + c3 * z**3), rel=0.03) == G
