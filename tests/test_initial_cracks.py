@@ -156,13 +156,25 @@ def test_a_polygon_breaks_the_elements_around_it() -> None:
     ([(0.0, 0.5)], None, "points must be 2 or more of 2 coordinates"),
     ([(0.0, 0.5, 0.0), (1.0, 0.5, 0.0)], None, "points must be 2 or more of 2 coordinates"),
     ([(0.2, 0.5), (0.2, 0.5)], None, "its points are no line"),
-    ([(0.0, 0.5), (0.4, 0.5)], None, "no element lies in it; it runs along their edges or leaves the body: the"),
-    ([(0.0, 2.5), (0.4, 2.5)], 0.1, "no element lies in it"),
+    ([(0.0, 0.5), (0.4, 0.5)], None, "no element lies in it; it runs along their edges: the middle of"),
+    ([(0.0, 2.5), (0.4, 2.5)], 0.1, "no element lies in it; it leaves the body"),
+    ([(2.0, 0.5), (2.4, 0.5)], None, "no element lies in it; it leaves the body"),
     ([(0.0, 0.45), (0.4, 0.45)], 0.02, "width 0.02 mm is less than the mesh allows there, 0.1 mm")])
 def test_bands_that_cannot_be(points: Any, width: float | None, said: str) -> None:
     """Fails if a crack of no element, or one that is narrower than asked for, passes."""
     with pytest.raises(ParameterError, match=re.escape(said)):
         crack_along(Space(grid("quad", (10, 10))), "a", points, "broken", width)
+
+
+@pytest.mark.parametrize("n", [10, 30, 70])
+def test_the_width_that_a_refusal_names_is_enough(n: int) -> None:
+    """Fails if a crack along edges of elements is refused again with the width that the refusal asks for."""
+    space = block(n).space
+    with pytest.raises(ParameterError, match="it runs along their edges") as error:
+        crack_along(space, "a", [(0.0, 0.5), (0.4, 0.5)], "whole")
+    width = float(re.findall(r"a width of at least (\S+) mm", str(error.value))[0])
+    assert crack_along(space, "a", [(0.0, 0.5), (0.4, 0.5)], "whole", width).elements.size == 2 * round(0.4 * n)
+    assert width < 1.02 / n
 
 
 def test_scenes_that_cannot_be() -> None:

@@ -86,10 +86,7 @@ def crack_along(space: Space, name: str, points: Sequence[Sequence[float]], lips
     crossed = band.crossed()
     taken = crossed if width is None else crossed | band.within(0.5 * width)
     if not taken.any():
-        near = int(np.argmin(band.distance()))
-        raise ParameterError(f"crack {name}: no element lies in it; it runs along their edges or leaves the body: the "
-                             f"nearest is at {place_text(space.X[space.conn[near]].mean(axis=0))} mm, "
-                             f"{space.h[near]:.3g} mm large; give a width of at least that, or points in the body")
+        raise ParameterError(f"crack {name}: no element lies in it; " + _cure(space, band.distance()))
     elements = np.flatnonzero(taken)
     line = band if isinstance(band, _Line) else None
     found = InitialCrack(name, elements, lips, band.extent, *(() if line is None else line.ends(elements)))
@@ -113,6 +110,18 @@ def of_length(points: Sequence[Sequence[float]], length: float) -> list[list[flo
         corners.append(np.asarray(point, float))
         left -= size
     return [corner.tolist() for corner in corners]
+
+
+def _cure(space: Space, distance: np.ndarray) -> str:
+    """Why no element is in a band whose middles are at that `distance` from it (ne,) [mm], and what to do."""
+    near = int(np.argmin(distance))
+    if not distance[near] < space.h[near]:
+        return "it leaves the body: give points in the body"
+    digit = 10.0 ** (np.floor(np.log10(distance[near])) - 2)
+    width = np.ceil(2 * distance[near] / digit * (1 + 1e-9)) * digit
+    return (f"it runs along their edges: the middle of the nearest is at "
+            f"{place_text(space.X[space.conn[near]].mean(axis=0))} mm; give a width of at least {width:.4g} mm, which "
+            f"takes those on both sides of the edges, or points beside them")
 
 
 class _Line:
