@@ -32,6 +32,7 @@ from skfsink.run.observers.release import EnergyRelease
 from skfsink.run.observers.view import View
 from skfsink.run.simulate import Simulation
 from skfsink.scene.scene import Scene
+from skfsink.sweep.table import read_rows, read_units
 
 
 def event(**controls: Any) -> Scene:
@@ -221,6 +222,8 @@ def test_rate_of_an_initial_crack_at_the_onset(crack: dict[str, Any], lips: str,
     s = 1 + run.summary["onset"]["displacement_mm"] / 2
     assert rates["phase"][0] == "onset" and rates["note"][0] == ""
     assert rates["x_mm"][0] == pytest.approx(4.0)
+    (row,) = read_rows([tmp_path], [{"phi": 0.5}])  # as a run of a sweep, which lies in the folder `run` of its own
+    assert row["onset_G"] == rates["G_N_per_mm"][0] and read_units([tmp_path])["onset_G"] == "N/mm"
     assert rates["G_N_per_mm"][0] == pytest.approx(2 * 0.5 * (s**2 + s**-2 - 2), rel=off)
 
 
