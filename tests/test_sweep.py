@@ -225,6 +225,8 @@ def test_axes_have_units_and_panels_have_points(tmp_path: Path, monkeypatch: pyt
     assert [(ax.get_xlabel(), ax.get_ylabel()) for ax in axes] == [
         ("angle [degree]", "U [N mm/mm]"), ("angle [degree]", "tear angle [degree]")]
     assert axes[1].get_ylim()[0] <= -45.0 and axes[0].get_ylim()[0] == 0.0
+    still = [{"angle": angle, "analysis": "dynamic", "branches": 0} for angle in (0.0, 45.0)]
+    assert drawn(still, ["angle"], {}, tmp_path / "still.png", monkeypatch).axes[0].get_ylim() == (0.0, 1.0)
 
 
 def test_text_is_drawn_in_categories_and_what_else_varies_in_colours(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
