@@ -26,7 +26,7 @@ class Rate(sk.Observer):
 def opened(cut):
     """Stored energy [N mm] and G [N/mm] of trousers with that cut, and the run."""
     rate = Rate((cut, 0.55, T / 2))
-    corners = [[0, 0.55, 0], [cut - 0.01, 0.55, 0], [cut - 0.01, 0.55, T], [0, 0.55, T]]
+    corners = [[0, 0.55, 0], [cut, 0.55, 0], [cut, 0.55, T], [0, 0.55, T]]
     run = sk.custom(mesh="sheet.vtu", title="Trousers", observers=[rate], out=f"results/cut{cut}", overwrite=True,
                     length_scale="0.2 mm", cracks=[{"name": "cut", "points": corners, "lips": "whole"}],
                     grips=[{"boundary": "upper", "y": 0, "z": [[0, 0], [1, 0.2]]},

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,8 @@ from guarded import Stop, simulation
 from plates import deck, plate
 from test_loads import TOUGH, Loaded, rollers, scene, side
 
-from skfsink.errors import Interrupted, ParameterError
+import skfsink
+from skfsink.errors import CheckpointError, Interrupted, OutputError, ParameterError
 from skfsink.fem.space import Space
 from skfsink.fields.body import Body
 from skfsink.fields.density import DensitySolver
@@ -29,6 +31,7 @@ from skfsink.methods.explicit import Explicit
 from skfsink.methods.hht import HHT
 from skfsink.run.display import Display
 from skfsink.run.simulate import Simulation
+from skfsink.run.unreached import unreached
 from skfsink.scene.deck import read_deck
 from skfsink.scene.described import made_in_python
 from skfsink.scene.registry import find_case
@@ -341,6 +344,24 @@ def written(folder: Path, course: str) -> Path:
     return deck(folder, HEAD + GRIPS.format(course))
 
 
+def test_cycles_that_an_event_does_not_come_to(tmp_path: Path) -> None:
+    """Fails if cycles after the onset are dropped without a word, or a ramp that only goes on, or rests, is one."""
+    made = read_deck(written(tmp_path, '"1 um/s"')).scene()
+    quasi = replace(made, controls=replace(made.controls, analysis="quasistatic"))
+
+    def said(times: Sequence[float], values: Sequence[float], of: Any = quasi, end: float = 1.5) -> str:
+        grip = Grip("top", (0.0, Ramp(tuple(times), tuple(values))))
+        return unreached(replace(of, grips=(grip, made.grips[1])), 1.5, end)
+
+    assert unreached(made, 1.5, 1.5) == ""
+    text = said((0, 1, 2, 3, 4), (0, 1, 2, 0, 2))
+    assert "turns at load time 2 s, which this run does not come to: it begins to fail at 1.5 s, and a quasi-" in text
+    assert "turns at load time 3 s" in said((0, 2, 3, 4), (0, 1, 1, 0))
+    assert said((0, 1, 2), (0, 1, 3)) == said((0, 1, 2, 3), (0, 1, 2, 5)) == said((0, 1, 2, 3), (0, 1, 2, 2)) == ""
+    assert said((0, 2, 3), (0, 1, 0), end=2.5) == ""
+    assert "the event lasts 0.1 s" in said((0, 2, 3), (0, 1, 0), made, 1.6)
+
+
 def test_points_of_a_deck_in_a_file(tmp_path: Path) -> None:
     """Fails if 500 points do not fit, or if those of a file, with units or without, are not those of a table."""
     t = np.linspace(0.0, 10.0, 500)
@@ -379,5 +400,35 @@ def test_a_curve_is_made_in_python(tmp_path: Path) -> None:
     other = replace(made, grips=(Grip("top", (0.0, curve)), made.grips[1]))
     assert made_in_python(made, find_case("custom")) == ()
     assert made_in_python(other, find_case("custom")) == ("grips",)
-    with pytest.raises(ParameterError, match=r"^grip top, y: a function of the time stands in no deck"):
-        read_tables("grips", other.grips)
+    assert read_tables("grips", other.grips)[0]["y"] is curve
+    with pytest.raises(ParameterError, match=r"^pressure top, value takes no function of the time, as x, y and z of"):
+        read_tables("pressures", [{"boundary": "top", "value": curve}])
+
+
+def swung(t: float) -> float:
+    """A displacement [mm] that swings once and rises."""
+    return float(0.02 * t + 0.01 * np.sin(2 * np.pi * t))
+
+
+def test_custom_takes_a_curve(tmp_path: Path) -> None:
+    """Fails if the function `custom` refuses a curve, moves the grip by its polyline, or goes on with another one."""
+    write_mesh(tmp_path / "plate.vtu", plate())
+    still = {"boundary": "bottom", "x": 0, "y": 0}
+    asked = {"mesh": tmp_path / "plate.vtu", "phi": 10.0, "length_scale": 1.0, "quiet": True}
+    curve = Curve(swung, 2.0, tolerance=0.05)
+    given = [{"boundary": "top", "x": 0, "y": curve}, still]
+    made = skfsink.custom.scene(**{**asked, "grips": given})
+    assert made.grips[0].velocity[1] is curve and made_in_python(made, find_case("custom")) == ("grips",)
+    points = made.parameters["grips"][0]["y"]
+    assert points[-1] == [2.0, swung(2.0)] and len(points) < 100
+    folder = tmp_path / "run"
+    run = skfsink.custom(**asked, grips=given, out=folder)
+    time, way = run.history["time_s"], run.history["grip_displacement_mm"]
+    np.testing.assert_allclose(way, [swung(t) for t in time], rtol=1e-12)
+    assert time[-1] == 2.0 and skfsink.load(folder).made_in_python == ("grips",)
+    with pytest.raises(OutputError, match=re.escape("resume it from there, with grips=…, the same")):
+        skfsink.custom(**asked, resume=folder)
+    again = skfsink.custom(**asked, grips=given, resume=folder)
+    np.testing.assert_array_equal(again.history["reaction_N_per_mm"], run.history["reaction_N_per_mm"])
+    with pytest.raises(CheckpointError, match="scene"):
+        skfsink.custom(**asked, grips=[{**given[0], "y": Curve(swing, 2.0)}, still], resume=folder)

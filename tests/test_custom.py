@@ -269,6 +269,7 @@ def test_only_custom_scenes_have_tables(tmp_path: Path) -> None:
     ({"grips": ()}, "at least one grip, traction or pressure"),
     ({"speed": 1.0}, "speed is for the cases"), ({"half": True}, "half is for the cases"),
     ({"model": "auto"}, "model is for the cases"),
+    ({"model": "onset"}, "got 'onset': event_time = \"1 ns\" ends the run at the onset"),
     ({"faces": "nope"}, "faces: 'nope' is no boundary of mesh plate, which has bottom, left, notch, right, top;"),
     ({"faces": "left right"}, "'left right' is no boundary"), ({"faces": ["left"]}, "faces must be text, names of"),
     ({"grips": [Grip("top", (0, "1 mm"))]}, "grip top, y must be a quantity in mm/s"),

@@ -29,6 +29,7 @@ from skfsink.results.history import History
 from skfsink.run.checks import refuse
 from skfsink.run.display import Display
 from skfsink.run.simulate import Simulation
+from skfsink.run.summarize import summarize
 from skfsink.run.verdict import verdict
 from skfsink.scene.deck import read_deck
 from skfsink.scene.described import made_in_python
@@ -81,6 +82,9 @@ def test_a_body_under_load_is_let_go_where_it_was_asked(tmp_path: Path) -> None:
         kinetic = table["kinetic"][event].max() / table["elastic"][event][0]
         assert kinetic < 1e-6 if moved == 0.02 else kinetic > 0.3
         assert abs(state.ledger.balance) < 1e-9 * max(state.ledger.initial, state.ledger.work)
+        summary = summarize(of, sim)  # nothing fails there: no place of an onset, and no direction of a tear from it
+        assert summary["onset"]["place_mm"] is summary["onset"]["boundary"] is None
+        assert summary["event"]["tear_angle_degree"] is None and summary["onset"]["displacement_mm"] is not None
 
 
 def test_an_impact_is_a_wave(tmp_path: Path) -> None:

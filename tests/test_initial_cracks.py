@@ -13,14 +13,17 @@ import pytest
 from bodies import distorted, grid, same_bits
 from guarded import Stop, simulation
 from plates import contents, deck, invoke_program, plate
+from scipy.optimize import brentq
 
+import skfsink
 from skfsink.errors import Interrupted, MeshError, ParameterError, SkfsinkError
 from skfsink.fem.space import Space
 from skfsink.fields.body import Body
 from skfsink.fields.state import State
-from skfsink.loads.grips import Grip
+from skfsink.loads.grips import Grip, Ramp
 from skfsink.material import AAA, SinkLaw
-from skfsink.meshing.cracks import InitialCrack, crack_along, crack_of_elements
+from skfsink.meshing.cracks import InitialCrack, crack_along, crack_of_elements, of_length
+from skfsink.meshing.grid import grid_mesh
 from skfsink.meshing.sample import Sample, file_sample
 from skfsink.meshing.vtu import write_mesh
 from skfsink.methods.statics import Statics
@@ -80,6 +83,61 @@ def test_a_line_breaks_the_elements_that_it_crosses() -> None:
     assert x[0] < 0.06 and x[-1] > 0.94 and np.diff(x).max() < 0.06  # no gap
 
 
+def test_a_crack_ends_with_the_element_whose_middle_is_its_end() -> None:
+    """Fails if rounding decides on the last element, or the crack does not say where it ends: at 0.35 of tenths the
+    middle of the fourth element is at 0.35000000000000003."""
+    ten = block(10)
+    for k in range(9):
+        for end, past in ((k + 0.5) / 10, 1), ((k + 0.5 - 1e-4) / 10, 0), ((k + 0.5 + 1e-4) / 10, 1):
+            if k + past == 0:
+                continue
+            crack = crack_along(ten.space, "cut", [(0.0, 0.45), (end, 0.45)], "whole")
+            assert crack.elements.size == k + past
+            assert crack.reach == pytest.approx((0.0, (k + past) / 10))
+            turned = crack_along(ten.space, "cut", [(0.45, 1.0), (0.45, 1.0 - end)], "whole")
+            assert turned.elements.size == k + past
+    corner = crack_along(ten.space, "cut", [(0.0, 0.45), (0.45, 0.45), (0.45, 0.75)], "whole")
+    assert corner.elements.size == 8 and corner.reach == pytest.approx((0.0, 0.8))
+    solid = Space(grid("hex", (10, 3, 3)))
+    for k in range(1, 9):
+        end = (k + 0.5) / 10
+        flat = [(0.0, 0.0, 0.5), (end, 0.0, 0.5), (end, 1.0, 0.5), (0.0, 1.0, 0.5)]
+        assert crack_along(solid, "cut", flat, "whole").elements.size == 3 * (k + 1)
+
+
+def test_the_length_of_a_line() -> None:
+    """Fails if a line of a given length ends elsewhere, or turns at another place, cut short or lengthened."""
+    way = [(0.0, 0.5), (0.3, 0.5), (0.3, 0.5), (0.3, 0.9)]
+    for length, end in (0.2, (0.2, 0.5)), (0.3, (0.3, 0.5)), (0.5, (0.3, 0.7)), (0.7, (0.3, 0.9)), (0.8, (0.3, 1.0)):
+        line = of_length(way, length)
+        np.testing.assert_allclose(line[-1], end, atol=1e-12)
+        assert np.linalg.norm(np.diff(line, axis=0), axis=1).sum() == pytest.approx(length)
+        assert length <= 0.3 or line[1] == [0.3, 0.5]
+    table = {"name": "c", "points": [[0.0, 0.5], [0.2, 0.5]], "lips": "whole"}
+    short, longer = (cracks_of([{**table, "length": length}], BLOCK)[0] for length in (0.1, "400 um"))
+    assert (short.extent, longer.extent) == pytest.approx((0.1, 0.4))
+    assert np.isin(short.elements, longer.elements).all() and longer.elements.size == slit("whole").elements.size
+
+
+def test_a_cut_that_opens_is_no_stretched_body(tmp_path: Path) -> None:
+    """Fails if loading ends because the elements of a cut, which bear nothing, are opened to 30 times their width."""
+    x, y = np.linspace(0, 1, 11), np.concatenate([np.linspace(0, 0.4, 5), np.linspace(0.41, 0.81, 5)])
+    write_mesh(tmp_path / "sheet.vtu", grid_mesh(x, y))
+    sheet = file_sample(tmp_path / "sheet.vtu")
+    narrow = crack_along(sheet.space, "cut", [(0.0, 0.405), (0.5, 0.405)], "whole")
+    pull = Ramp((0.0, 1.0), (0.0, 0.5))
+    of = Scene("sheet", "Sheet", {}, sheet, AAA(c2=0.0), SinkLaw(phi=1e6, length_scale=0.2),
+               (Grip("top", (0.0, pull)), Grip("bottom", (0.0, 0.0))), cracks=(narrow,),
+               controls=Controls(element="planestress"))
+    body = Body.of(of)
+    statics, state = Statics(body, of.controls.statics), body.begin()
+    for _ in statics.load(state):
+        pass
+    ends = [np.argmin(np.linalg.norm(sheet.space.X - (0.0, y), axis=1)) for y in (0.4, 0.41)]
+    opening = float(np.diff(state.u[ends, 1])[0])
+    assert opening > 30 * 0.01 and statics.unfailed == "nothing moves after load time 1 s"
+
+
 def test_a_polygon_breaks_the_elements_around_it() -> None:
     """Fails if a surface in space has a hole, or reaches beyond its sides."""
     space = Space(grid("hex", (8, 8, 5)))
@@ -98,13 +156,25 @@ def test_a_polygon_breaks_the_elements_around_it() -> None:
     ([(0.0, 0.5)], None, "points must be 2 or more of 2 coordinates"),
     ([(0.0, 0.5, 0.0), (1.0, 0.5, 0.0)], None, "points must be 2 or more of 2 coordinates"),
     ([(0.2, 0.5), (0.2, 0.5)], None, "its points are no line"),
-    ([(0.0, 0.5), (0.4, 0.5)], None, "no element lies in it; it runs along their edges or leaves the body: the"),
-    ([(0.0, 2.5), (0.4, 2.5)], 0.1, "no element lies in it"),
+    ([(0.0, 0.5), (0.4, 0.5)], None, "no element lies in it; it runs along their edges: the middle of"),
+    ([(0.0, 2.5), (0.4, 2.5)], 0.1, "no element lies in it; it leaves the body"),
+    ([(2.0, 0.5), (2.4, 0.5)], None, "no element lies in it; it leaves the body"),
     ([(0.0, 0.45), (0.4, 0.45)], 0.02, "width 0.02 mm is less than the mesh allows there, 0.1 mm")])
 def test_bands_that_cannot_be(points: Any, width: float | None, said: str) -> None:
     """Fails if a crack of no element, or one that is narrower than asked for, passes."""
     with pytest.raises(ParameterError, match=re.escape(said)):
         crack_along(Space(grid("quad", (10, 10))), "a", points, "broken", width)
+
+
+@pytest.mark.parametrize("n", [10, 30, 70])
+def test_the_width_that_a_refusal_names_is_enough(n: int) -> None:
+    """Fails if a crack along edges of elements is refused again with the width that the refusal asks for."""
+    space = block(n).space
+    with pytest.raises(ParameterError, match="it runs along their edges") as error:
+        crack_along(space, "a", [(0.0, 0.5), (0.4, 0.5)], "whole")
+    width = float(re.findall(r"a width of at least (\S+) mm", str(error.value))[0])
+    assert crack_along(space, "a", [(0.0, 0.5), (0.4, 0.5)], "whole", width).elements.size == 2 * round(0.4 * n)
+    assert width < 1.02 / n
 
 
 def test_scenes_that_cannot_be() -> None:
@@ -268,6 +338,8 @@ def test_cracks_of_a_deck(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
     ({"lips": "whole"}, "crack c needs points or elements, the name of a set of them"),
     ({"lips": "whole", "points": [[3, 2], [4, 2]], "elements": "x"}, "crack c needs points or elements, the name"),
     ({"lips": "whole", "elements": "x", "width": 1.0}, "crack c: width is for points"),
+    ({"lips": "whole", "elements": "x", "length": 1.0}, "crack c: length is for points"),
+    ({"lips": "whole", "points": [[3, 2], [4, 2]], "length": 0}, "crack c: length must be a finite number in (0"),
     ({"lips": "whole", "elements": "x"}, "mesh plate has no set of elements 'x'"),
     ({"lips": "whole", "points": [[3, 2], [4, 2]], "width": 0}, "crack c: width must be a finite number in (0"),
     ({"lips": "whole", "points": [[3, 2], [4]]}, "crack c, points: a point must be 2 or 3 coordinates"),
@@ -297,3 +369,46 @@ def test_bodies_in_space(tmp_path: Path) -> None:
         found.append(onset(of)[0])
     assert found[0].grip == found[1].grip
     assert found[0].ledger.elastic == pytest.approx(found[1].ledger.elastic, rel=1e-6)
+
+
+@pytest.mark.slow
+def test_trousers_of_rivlin_and_thomas(tmp_path: Path) -> None:
+    """Fails if loading ends as the narrow cut opens, or the J integral of long legs, which are bent by 90 degrees, is
+    not 2 F s/t - w W, with the stretch s of the legs and their energy density W by the force F; w is both widths.
+
+    The legs of 15 mm are not endless: they bend in part of their length, for which 3 % are allowed.
+    """
+    leg, thick, gap, cut = 6.0, 1.0, 0.2, 15.0
+    c1, c2, c3 = 0.2136, -0.00511, 0.000345
+    side = np.linspace(0.0, leg, 7)
+    mesh = grid_mesh(np.linspace(0, 30, 31), [*side, *(leg + gap + side)], np.linspace(0, thick, 3))
+    x, y, _ = mesh.points.T
+    mesh.point_sets = {"upper": np.flatnonzero((x == 0) & (y > leg + 0.1)), "lower": np.flatnonzero(
+        (x == 0) & (y < leg + 0.1))}
+    write_mesh(tmp_path / "sheet.vtu", mesh)
+    middle = leg + gap / 2
+    rates: list[tuple[float, float]] = []
+
+    class Rate(skfsink.Observer):
+        def loading(self, view: Any) -> None:
+            rates.append((view.load, skfsink.energy_release_rate(
+                view.body, view.state, (cut, middle, thick / 2), [1, 0, 0], 3.5, front=[0, 0, 1]).G))
+
+    run = skfsink.custom(
+        mesh=tmp_path / "sheet.vtu", material="yeoh", constants=f"c1 = {c1}, c2 = {c2}, c3 = {c3}", phi=30.0,
+        length_scale=1.5, observers=[Rate()], out=tmp_path / "run", quiet=True,
+        cracks=[{"name": "cut", "lips": "whole", "points": [[0, middle, 0], [cut, middle, 0], [cut, middle, thick],
+                                                            [0, middle, thick]]}],
+        grips=[{"boundary": "upper", "y": 0, "z": [[0, 0], [1, 18]]}, {"boundary": "right", "x": 0, "y": 0, "z": 0},
+               {"boundary": "lower", "y": 0, "z": [[0, 0], [1, -18]]}])
+    force, G = rates[-1]
+    assert run.history["grip_displacement_mm"][-1] == pytest.approx(36.0)
+
+    def stress(s: float) -> float:
+        z = s**2 + 2 / s - 3
+        return 2 * (s - s**-2) * (c1 + 2 * c2 * z + 3 * c3 * z**2)
+
+    s = brentq(lambda s: stress(s) - force / (leg * thick), 1.0, 2.0)
+    z = s**2 + 2 / s - 3
+    assert 1.05 < s < 1.1
+    assert pytest.approx(2 * force * s / thick - 2 * leg * (c1 * z + c2 * z**2 + c3 * z**3), rel=0.03) == G

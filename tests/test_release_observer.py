@@ -15,12 +15,14 @@ import skfem
 from guarded import NOTCHED, Stop, scene, simulation
 from plates import drawing, sample_of
 
+import skfsink
 from skfsink.errors import Interrupted, OutputError, ParameterError
 from skfsink.fem.space import Space
 from skfsink.fields.crack import CrackTracker
 from skfsink.fields.release_rate import energy_release_rate
 from skfsink.loads.grips import Grip
 from skfsink.material import AAA
+from skfsink.meshing.vtu import write_mesh
 from skfsink.results.history import History, history_header, history_units
 from skfsink.results.release import load_release, release_header, write_release
 from skfsink.run.display import Display
@@ -30,6 +32,7 @@ from skfsink.run.observers.release import EnergyRelease
 from skfsink.run.observers.view import View
 from skfsink.run.simulate import Simulation
 from skfsink.scene.scene import Scene
+from skfsink.sweep.table import read_rows, read_units
 
 
 def event(**controls: Any) -> Scene:
@@ -196,6 +199,34 @@ def test_file_of_rates_is_read_as_it_was_written(tmp_path: Path) -> None:
 
 
 # --- where a crack goes ---
+@pytest.mark.parametrize(("crack", "lips", "off"), [
+    ({"points": [[0.0, 1.0], [4.0, 1.0]]}, "whole", 5e-3), ({"points": [[0.0, 1.0], [4.0, 1.0]]}, "broken", 2e-2),
+    ({"elements": "cut"}, "whole", 2e-2)])
+def test_rate_of_an_initial_crack_at_the_onset(crack: dict[str, Any], lips: str, off: float, tmp_path: Path) -> None:
+    """Fails if a crack that the mesh has not gives no G at the onset, or another than W h of a strip in pure shear, of
+    Rivlin and Thomas: it is cut from one end to its middle line, and clamped along its long sides.
+
+    A neo-Hookean sheet without change of volume has W = mu/2 (s^2 + 1/s^2 - 2) there.
+    """
+    mesh = skfsink.grid_mesh(np.linspace(0, 12, 97), np.linspace(0, 2, 18))
+    middle = mesh.points[mesh.cells[0].data].mean(axis=1)
+    cut = np.flatnonzero((np.abs(middle[:, 1] - 1.0) < 0.01) & (middle[:, 0] < 4.0))
+    mesh.cell_sets = {"cut": [cut]}
+    write_mesh(tmp_path / "strip.vtu", mesh)
+    run = skfsink.custom(
+        mesh=tmp_path / "strip.vtu", element="planestress", material="neo-hookean", constants="mu = 1 MPa",
+        phi="0.5 MPa", length_scale="0.2 mm", out=tmp_path / "run", stop="time > 0.1 us", quiet=True,
+        grips=[{"boundary": "top", "x": 0, "y": 1}, {"boundary": "bottom", "x": 0, "y": 0}],
+        cracks=[{"name": "slit", "lips": lips, **crack}], probes=[{"name": "tear", "kind": "release_rate", "every": 1}])
+    rates = load_release(run.folder / "release.csv")
+    s = 1 + run.summary["onset"]["displacement_mm"] / 2
+    assert rates["phase"][0] == "onset" and rates["note"][0] == ""
+    assert rates["x_mm"][0] == pytest.approx(4.0)
+    (row,) = read_rows([tmp_path], [{"phi": 0.5}])  # as a run of a sweep, which lies in the folder `run` of its own
+    assert row["onset_G"] == rates["G_N_per_mm"][0] and read_units([tmp_path])["onset_G"] == "N/mm"
+    assert rates["G_N_per_mm"][0] == pytest.approx(2 * 0.5 * (s**2 + s**-2 - 2), rel=off)
+
+
 def test_tip_of_a_notch_is_its_root() -> None:
     """Fails if the direction into the body is wrong at a notch, at a slit without width, or at a plane of symmetry."""
     space = NOTCHED.sample.space

@@ -294,7 +294,7 @@ DECK = Deck("single_edge_notch", {"mesh": "coarse"})
     (lambda: Deck("custom", {"foo": 1}).scene(), ParameterError, "'foo' is no parameter"),
     (lambda: Deck("single_edge_notch", {"mesh": 3}).scene(), ParameterError, "mesh must be text; got 3"),
     (lambda: Deck("single_edge_notch", {"side": "4 s"}).scene(), ParameterError, "side must be"),
-    (lambda: DECK.run(bogus=1), ParameterError, "run of a deck takes out, overwrite, .*; got 'bogus'"),
+    (lambda: DECK.run(bogus=1), ParameterError, "'bogus' is no parameter of single_edge_notch; .* out, over"),
     (lambda: read_deck(None), ParameterError, "the path of a deck must be a path; got None"),
     (lambda: read_scene(None), ParameterError, "folder must be a path; got None"),
     (lambda: Options(constants={"mu": 1.0}), ParameterError, r"constants must be text, such as 'mu = .*; got \{'mu'"),

@@ -94,7 +94,7 @@ def test_a_function_ends_a_run_and_can_say_why(mesh: Path, tmp_path: Path) -> No
     assert result.summary["end"] == "it was to stop at a tenth in motion"
     assert 0.8 < len(asked) / (result.state.time / 1e-6) < 1.2  # once a microsecond
     assert sk.load(result.folder).made_in_python == ("stop",)
-    with pytest.raises(OutputError, match=r"were made in Python \(stop\): resume it from there, with stop=FUNCTION"):
+    with pytest.raises(OutputError, match=r"were made in Python \(stop\): resume it from there, with stop=…, the same"):
         sk.single_edge_notch(resume=result.folder, quiet=True)
     again = sk.single_edge_notch(resume=result.folder, stop=kinetic, quiet=True)
     assert again.summary["end"] == result.summary["end"] and again.state.time == result.state.time

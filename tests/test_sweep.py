@@ -10,6 +10,7 @@ import shutil
 import subprocess
 import sys
 import time
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -94,6 +95,18 @@ def test_constants_of_laws_vary(text: str, name: str, unit: str, values: list[fl
     assert LAYERS.parameters == before
 
 
+def test_the_length_of_a_crack_varies() -> None:
+    """Fails if a sweep cannot change how long a crack of the deck is, by its name or as the only one."""
+    cut = {"name": "cut", "points": [[0.0, 1.0], [2.0, 1.0]], "lips": "whole"}
+    deck = Deck("custom", {"mesh": "a.vtu", "cracks": (cut,)})
+    for name in "cut.length", "cracks.length":
+        found = read_variation(f"{name}=1 mm..3 mm:3", deck)
+        assert (found.what.unit, found.values) == ("mm", [1.0, 2.0, 3.0])
+        assert with_values([found], {name: 3.0}, deck.parameters)["cracks"] == ({**cut, "length": 3.0},)
+    with pytest.raises(ParameterError, match="numbers of cracks are width, length"):
+        read_variation("cut.points=1,2", deck)
+
+
 @pytest.mark.parametrize(("text", "said"), [
     ("mu=1,2", "constants of hgo are c, k1, k2, kappa, angle, axis, normal"), ("axis=1,2", "it is a vector"),
     ("core.1.k2=1,2", "numbers of regions are phi, m, bulk_modulus, density, viscosity"),
@@ -134,7 +147,7 @@ def test_every_combination_once_a_table_and_a_picture(deck: Path, tmp_path: Path
     (out / "phi=0.17,notch_width=0.1").mkdir(parents=True)
     (out / "phi=0.17,notch_width=0.1" / "run").write_text("in the way")  # the folder of the third cannot be made
     status, err, _ = invoke_program(*arguments, "--jobs", 2)
-    assert (status, err) == (0, "")
+    assert status == 2 and err.startswith("skfsink: 1 of 3 runs of the sweep failed, first phi=0.17,notch_width=0.1: ")
     rows = table(out)
     assert [(row["phi"], row["folder"]) for row in rows] == [
         (phi, f"phi={phi},notch_width=0.1") for phi in ("0.15", "0.16", "0.17")]
@@ -160,6 +173,29 @@ def test_mistakes_are_found_before_anything_is_made(deck: Path, tmp_path: Path) 
     assert status == 2
     assert "phi must be" in err and err.count("\n") == 1
     assert not (tmp_path / "sweep").exists()
+
+
+def test_failed_runs_are_warned_of(tmp_path: Path) -> None:
+    """Fails if Python gets rows without results in silence, or values by name are others than those of a text."""
+    write_mesh(tmp_path / "a.vtu", plate())
+    path = tmp_path / "sheet.toml"
+    path.write_text('case = "custom"\n[parameters]\nmesh = "a.vtu"\nlength_scale = "0.6 mm"\nphi = "9 MPa"\n'
+                    'stop = "displacement > 1e-3 mm"\n[[grips]]\nboundary = "top"\ny = 1\n'
+                    '[[grips]]\nboundary = "bottom"\ny = 0\n')
+    said = r"^1 of 2 runs of the sweep failed, first m=9,mesh=no.vtu: there is no mesh file .*no.vtu; they are rows"
+    with pytest.warns(UserWarning, match=said):
+        rows = run_sweep(str(path), {"m": [9], "mesh": ["a.vtu", "no.vtu"]}, str(tmp_path / "out"), quiet=True)
+    assert [(row["m"], row["mesh"], bool(row["failure"])) for row in rows] == [
+        (9.0, "a.vtu", False), (9.0, "no.vtu", True)]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        again = run_sweep(path, ["m=9", "mesh=a.vtu"], tmp_path / "out", quiet=True)
+    assert again == rows[:1]
+    status, err, _ = invoke_program("sweep", path, "--vary", "mesh=no.vtu", "--out", tmp_path / "no", "--quiet")
+    assert status == 2 and err.startswith("skfsink: 1 of 1 runs of the sweep failed") and err.count("\n") == 1
+    assert len(table(tmp_path / "no")) == 1
+    with pytest.raises(ParameterError, match="m varies over a list of values; got '9'"):
+        run_sweep(path, {"m": "9"}, tmp_path / "never")
 
 
 def test_picture_of_an_ensemble(tmp_path: Path) -> None:
@@ -189,6 +225,8 @@ def test_axes_have_units_and_panels_have_points(tmp_path: Path, monkeypatch: pyt
     assert [(ax.get_xlabel(), ax.get_ylabel()) for ax in axes] == [
         ("angle [degree]", "U [N mm/mm]"), ("angle [degree]", "tear angle [degree]")]
     assert axes[1].get_ylim()[0] <= -45.0 and axes[0].get_ylim()[0] == 0.0
+    still = [{"angle": angle, "analysis": "dynamic", "branches": 0} for angle in (0.0, 45.0)]
+    assert drawn(still, ["angle"], {}, tmp_path / "still.png", monkeypatch).axes[0].get_ylim() == (0.0, 1.0)
 
 
 def test_text_is_drawn_in_categories_and_what_else_varies_in_colours(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -234,7 +272,7 @@ def test_units_are_those_of_the_bodies(tmp_path: Path) -> None:
         header = (tmp_path / "sweep.csv").read_text().splitlines()[0]
         assert next(csv.reader([header]))[2:5] == ["onset_displacement [mm]", f"onset_load [{load}]",
                                                    f"greatest_load [{load}]"]
-        assert next(csv.reader([header]))[9:11] == [f"U [{energy}]", f"D [{energy}]"]
+        assert next(csv.reader([header]))[9:12] == ["onset_G [N/mm]", f"U [{energy}]", f"D [{energy}]"]
         assert [row["onset_load"] for row in rows] == [7.0] * len(some)
 
 

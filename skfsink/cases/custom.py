@@ -28,6 +28,7 @@ from ..scene.tables import (
     body_forces_of,
     cracks_of,
     grips_of,
+    in_points,
     pressures_of,
     read_tables,
     regions_of,
@@ -39,6 +40,11 @@ from ..units import Unit
 __all__ = ["custom"]
 
 IN_A_DECK = Parameter(parse=False)
+#: what to ask for in the place of a model
+INSTEAD = {"onset": 'event_time = "1 ns" ends the run at the onset', "statics": 'take analysis = "quasistatic"',
+           "dynamics": "leave it out", "full": 'take start = "rest"'}
+#: of the shared parameters: those for the cases of the paper alone
+REFUSED = ("model", "tolerance", "quantity", "half", "dimensions", "mesh_layout", "speed")
 
 
 @case_function
@@ -80,9 +86,11 @@ def custom(
         Distance within which nodes of the mesh become one [mm]; 0 leaves them apart. A mesh in pieces is refused.
     grips
         Boundaries that are held or moved: for x, y, z a velocity, or a ramp of points [time, displacement]; a
-        component left out is free. The load is the force on the first one that moves.
+        component left out is free. The load is the force on the first one that moves. From Python also a
+        :class:`.Curve`, a function of the load time.
     tractions
-        Dead loads on boundaries, per undeformed area: for x, y, z a rate, or a ramp of points [time, traction].
+        Dead loads on boundaries, per undeformed area: for x, y, z a rate, or a ramp of points [time, traction]. From
+        Python also a :class:`.Curve`.
     pressures
         Pressures on boundaries, which follow the deformed surface: a value, which is reached in the first second of
         load time, or a ramp of points [time, pressure]; or a rate. With `in_crack` they act in cracks from it as well.
@@ -116,7 +124,9 @@ def custom(
         Summary, history and last state; its files are in the output folder.
     """
     if check_options(options).model:
-        raise ParameterError(f"model is for the cases of the paper, whose models were measured; got {options.model!r}")
+        cure = INSTEAD.get(options.model, "analysis, integrator and start say what is computed")
+        raise ParameterError(f"model is for the cases of the paper, whose models were measured; got {options.model!r}: "
+                             f"{cure}")
     if not isinstance(faces, str):
         raise ParameterError(f"faces must be text, names of boundaries with commas, such as 'back, front'; got "
                              f"{faces!r:.80}")
@@ -153,8 +163,10 @@ def _scene(arguments: dict[str, Any], options: Options) -> Scene:
     rho0 = by_element(sample.space.n_elements, material.rho0, regions, lambda region: region.material.rho0)
     weights = tuple(partial(BodyForce, rho0=rho0, rate=rate, elements=sample.elements(name) if name else None)
                     for name, rate in body_forces_of(arguments.get("body_forces", ()), dim))
+    written = {name: in_points(arguments[name]) for name in ("grips", "tractions")}
     return Scene(
-        case="custom", title=arguments["title"], parameters={**arguments, **options.parameters()}, sample=sample,
+        case="custom", title=arguments["title"], sample=sample,
+        parameters={**arguments, **written, **options.parameters()},
         material=material, sink_law=sink_law, controls=options.controls(), regions=regions,
         grips=grips_of(arguments["grips"], dim),
         tractions=tractions_of(arguments["tractions"], dim), loads=weights, pressures=pressures,
@@ -163,7 +175,7 @@ def _scene(arguments: dict[str, Any], options: Options) -> Scene:
         faces=tuple(filter(None, (name.strip() for name in arguments["faces"].split(",")))))
 
 
-CASE = Case(custom, _scene)
+CASE = Case(custom, _scene, REFUSED)
 
 if __name__ == "__main__":
     from ..cli.program import command

@@ -29,7 +29,8 @@ EXAMPLES = {
     "cracks": ('[[cracks]]', 'name = "slit"',
                'points = [["0 mm", "2 mm"], ["1 mm", "2 mm"]]   # or elements = "a set"',
                'lips = "broken"         # as of a crack that has run, or "whole" as of a cut',
-               'width = "0.1 mm"        # left out: as narrow as the mesh allows'),
+               'width = "0.1 mm"        # left out: as narrow as the mesh allows',
+               'length = "1 mm"         # of a line, from its first point; left out: to its last'),
     "probes": ('[[probes]]', 'name = "tip"', 'kind = "point"          # line, mean, reaction, volume, opening,',
                '                        # release_rate',
                'position = ["1 mm", "2 mm"]', 'quantity = "stress, gamma"', '[[probes]]', 'name = "forces"',
@@ -71,6 +72,8 @@ def _lines(name: str) -> Iterator[str]:
     yield ""
     yield "[parameters]"
     for parameter in sorted(case.parameters.values(), key=lambda parameter: parameter.has_tables):  # tables come last
+        if parameter.name in case.refused:
+            continue
         yield ""
         yield from _comment(parameter.meaning)
         if parameter.has_tables:

@@ -34,9 +34,12 @@ def sweep(deck: Path, *, vary: Annotated[list[str], Parameter(negative="", consu
     quiet
         Show no progress.
     """
-    from ..sweep.plan import run_sweep
+    from ..errors import SkfsinkError
+    from ..sweep.plan import failed_runs, sweep_rows
     from ..system.shipped import deck_name, deck_path
 
     path = deck_path(deck)
-    run_sweep(path, vary, out or Path("results") / "sweep" / deck_name(path), jobs=jobs, scheduler=scheduler,
-              parquet=parquet, quiet=quiet)
+    rows = sweep_rows(path, vary, out or Path("results") / "sweep" / deck_name(path), jobs=jobs, scheduler=scheduler,
+                      parquet=parquet, quiet=quiet)
+    if text := failed_runs(rows):  # their rows are written: the exit status says that results are missing
+        raise SkfsinkError(text)

@@ -170,13 +170,14 @@ def mean_density(space: Space, gamma: np.ndarray) -> float:
     return float(np.einsum("eq,eq->", space.w, space.at_gauss(gamma)) / space.V.sum())
 
 
-def greatest_stretch(space: Space, u: np.ndarray) -> float:
-    """Greatest length of an edge of the body displaced by `u` (n, dim), relative to its undeformed one."""
-    greatest, corners = 1.0, np.arange(2**space.dim)
+def greatest_stretch(space: Space, u: np.ndarray, live: np.ndarray) -> float:
+    """Greatest length of an edge of the `live` elements, a mask (ne,), displaced by `u` (n, dim), relative to its
+    undeformed one; at least 1."""
+    greatest, corners, conn = 1.0, np.arange(2**space.dim), space.conn[live]
     for axis in range(space.dim):
-        ends = [space.conn[:, corners[(corners >> axis & 1) == side]] for side in range(2)]
+        ends = [conn[:, corners[(corners >> axis & 1) == side]] for side in range(2)]
         before = space.X[ends[1]] - space.X[ends[0]]
         after = before + u[ends[1]] - u[ends[0]]
         square = np.einsum("eai,eai->ea", after, after) / np.einsum("eai,eai->ea", before, before)
-        greatest = max(greatest, float(square.max()) ** 0.5)
+        greatest = max(greatest, float(square.max(initial=0.0)) ** 0.5)
     return greatest

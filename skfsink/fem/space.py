@@ -300,9 +300,16 @@ class Space:
     @cached_property
     def outer_faces(self) -> np.ndarray:
         """Mask (ne, 2 dim) of the faces (in 2D: sides) that belong to one element only, numbered 2 axis + side."""
+        return self.faces_without(np.zeros(0, int))
+
+    def faces_without(self, gone: np.ndarray) -> np.ndarray:
+        """The same of the body without the elements `gone` (their numbers), which have no faces."""
         faces = np.stack([node_key(self.conn[:, corners], self.n_nodes) for corners in self.face_corners], axis=1)
-        _, index, count = np.unique(faces, return_inverse=True, return_counts=True)
-        mask: np.ndarray = (count == 1)[index].reshape(faces.shape)
+        there = np.ones(self.n_elements, bool)
+        there[gone] = False
+        _, index, count = np.unique(faces[there], return_inverse=True, return_counts=True)
+        mask = np.zeros(faces.shape, bool)
+        mask[there] = (count == 1)[index].reshape(-1, faces.shape[1])
         return mask
 
     @property

@@ -116,7 +116,9 @@ class Momentum:
             if isinstance(material, GeneralMaterial):
                 if self.plane_stress:
                     raise ParameterError("element planestress is for laws of I1' alone; "
-                                         f"{type(material).__name__} has more invariants: take jbar")
+                                         f"{type(material).__name__} has more invariants: fit yeoh to the same curve, "
+                                         "or mesh the sheet with hexahedra between free faces; jbar is a thick plate, "
+                                         "up to a third stiffer in tension")
                 fibres = material.fibres(space.X[space.conn[elements]].mean(axis=1))
                 if space.axisymmetric:
                     _check_mirrored(fibres, type(material).__name__)

@@ -266,7 +266,7 @@ class StaticLoading:
             log.warning("no point has failed, although all are past their energy limiter (the least W/Phi is %.3g, "
                         "points fail near 1): loading ends; the regions' phi, m and the length l do not belong to this "
                         "body", over)
-        elif (stretch := greatest_stretch(self.space, state.u)) > self.STRETCHED:
+        elif (stretch := greatest_stretch(self.space, state.u, np.any(live, axis=1))) > self.STRETCHED:
             self.unfailed = f"the body is stretched by more than {self.STRETCHED:g}"
             log.warning("the body is stretched by %.3g without failing (the most is %g): loading ends; lower phi, or "
                         "take a material that stiffens", stretch, self.STRETCHED)

@@ -46,7 +46,7 @@ PICTURES = (
     ("animation.gif", "Animation", "Relative density γ on the deformed body, moving"),
 )
 _CARDS = ("displacement of the grips at the onset", "load at the onset", "first arrival of the crack at an edge",
-          "mean tip speed until the first arrival", "U at the first arrival", "D at the first arrival")
+          "mean tip speed until the first arrival or the end", "U at the first arrival", "D at the first arrival")
 
 
 @dataclass(frozen=True)

@@ -141,7 +141,7 @@ def key_table(runs: Sequence[Run], labels: Sequence[str], waves: Sequence[tuple[
         row_of("where it begins to fail", "", [_beginning(run) for run in runs]),
         row("first arrival of the crack at an edge", "µs", "event", "first_arrival_s", factor=1e6),
         row("first arrival of the crack at an edge", "pass", "event", "first_arrival_pass"),
-        row_of("mean tip speed until the first arrival", "m/s", mean),
+        row_of("mean tip speed until the first arrival or the end", "m/s", mean),
         row_of("mean speed over c_R", "", [_share(w, v, 1) for w, v in zip(waves, mean)]),
         row_of("greatest speed of the tip", "m/s", fastest),
         row_of("greatest speed over c_R", "", [_share(w, v, 1) for w, v in zip(waves, fastest)]),

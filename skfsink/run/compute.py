@@ -118,7 +118,7 @@ def run_case(case: Case, arguments: dict[str, Any], options: Options) -> Result:
 def _how_to_go_on(request: RunRequest) -> str:
     folder = str(request.folder)
     python = [*(["the same observers"] if request.options.observers else []),
-              *(["the same stop"] if request.made_in_python else [])]
+              *(f"the same {part}" for part in request.made_in_python)]
     if python:  # the command line has none
         return f"go on from Python with resume={folder!r} and {' and '.join(python)}"
     return f"go on with skfsink resume {shlex.quote(folder)}"

@@ -15,7 +15,7 @@ from ..scene.case import Case, shared_parameters
 from ..scene.options import NOT_PHYSICS, Options
 from ..scene.scene import Scene
 from ..scene.stored import SCENE, StoredScene, corridor_mesh, kept_mesh
-from ..scene.tables import read_tables
+from ..scene.tables import curved, read_tables
 from .checkpoint import check_version
 from .model import AUTO, choose_model
 
@@ -47,7 +47,8 @@ class RunRequest:
     @property
     def made_in_python(self) -> tuple[str, ...]:
         """What of it stands in no file."""
-        return ("stop",) if callable(self.options.stop) else ()
+        functions = [name for name in self.case.tables if curved(self.arguments.get(name, ()))]
+        return (*(["stop"] if callable(self.options.stop) else []), *functions)
 
     @property
     def folder(self) -> Path:
@@ -123,7 +124,8 @@ def _resumed(asked: RunRequest, folder: Path) -> RunRequest:
     if parts := {*stored.made_in_python} - {*asked.made_in_python}:
         raise OutputError(f"{folder / SCENE} does not describe its run, parts of which were made in Python "
                           f"({', '.join(stored.made_in_python)}): resume it from there, with "
-                          + ("stop=FUNCTION, the same" if parts == {"stop"} else "run(scene, folder, resume=True)"))
+                          + (f"{' and '.join(f'{part}=…' for part in sorted(parts))}, the same"
+                             if parts <= {"stop", *case.tables} else "run(scene, folder, resume=True)"))
     _check_agreement(asked, stored, folder)
     try:
         arguments, values = case.from_stored(stored, folder)
@@ -131,8 +133,11 @@ def _resumed(asked: RunRequest, folder: Path) -> RunRequest:
             raise KeyError(*sorted(others))
     except KeyError as error:
         raise OutputError(f"{folder / SCENE} is not the scene of a run: parameter {error}") from None
-    if callable(options.stop):  # the fingerprint says whether it is that of the run
-        values["stop"] = options.stop
+    for part in asked.made_in_python:  # the fingerprint says whether it is that of the run
+        if part == "stop":
+            values["stop"] = options.stop
+        else:
+            arguments[part] = asked.arguments[part]
     options = replace(options, **values, corridor=corridor_mesh(folder),
                       kept_mesh=kept_mesh(folder, arguments["mesh"]))
     return RunRequest(case, arguments, options, stored.model_choice)
@@ -145,7 +150,7 @@ def _check_agreement(asked: RunRequest, stored: StoredScene, folder: Path) -> No
     for name, value in {**asked.arguments, **asked.options.parameters()}.items():
         there = parameters.get(name)
         if name in asked.case.tables:
-            if len(value) and read_tables(name, value) != read_tables(name, there or ()):
+            if len(value) and not curved(value) and read_tables(name, value) != read_tables(name, there or ()):
                 raise ParameterError(f"{name} are not those of the run in {folder}; a resumed run keeps its scene")
             continue
         same = value == there or (name == "mesh" and origin(value) == origin(str(there)))

@@ -40,6 +40,7 @@ from .observers.progress import Checkpoint, Progress
 from .observers.range import check_scene
 from .observers.view import View
 from .stop import Stop
+from .unreached import unreached
 
 __all__ = ["Loaded", "Simulation", "standard_observers"]
 
@@ -215,6 +216,9 @@ class Simulation:
             if self.integrator is not None:
                 self.costs.factorisations += self.integrator.factorisations
             self._make_integrator().begin(state)
+        lasts = 0.0 if self.scene.controls.analysis == "quasistatic" else self.scene.controls.event_time
+        if text := unreached(self.scene, state.grip, state.grip + lasts):
+            log.warning(text)
         self.observers.begin(self.view.at(state, reaction, "begin"))
         self.ended = self._stop(self.view)
         self.display.say(f"the event begins at load time {state.grip:.4g} s" if self.view.on_time else

@@ -98,6 +98,7 @@ def crack_summary(scene: Scene, body: Body) -> list[dict[str, Any]]:
     whole = None if None in extents or not extents else sum(extents)  # type: ignore[arg-type]
     extent = "length_mm" if space.dim == 2 else "area_mm2"
     return [{"name": crack.name, "lips": crack.lips, "elements": crack.elements.size, extent: crack.extent,
+             **({} if crack.reach is None else {"reach_mm": list(crack.reach)}),
              "width_mm": crack.width(space), "lost_width_mm": None if whole is None else lost / whole}
             for crack in scene.cracks]
 

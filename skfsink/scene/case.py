@@ -71,10 +71,13 @@ class Case:
     ----------
     function: that people call; its signature and docstring are the command line and its help.
     scene: makes the scene from the arguments of the function (all but `options`) and the options.
+    refused: names of shared parameters that have no meaning in it; `scene`, or the function, refuses other values than
+        their defaults, and `skfsink show` leaves them out.
     """
 
     function: Callable[..., Any]
     scene: Callable[[dict[str, Any], Options], Scene]
+    refused: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:

@@ -14,7 +14,7 @@ A `custom` scene also has tables [[grips]], [[tractions]], [[body_forces]] and [
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -45,25 +45,47 @@ class Deck:
     case: str
     parameters: Mapping[str, Any]
 
-    def run(self, **output: Any) -> Any:
-        """Run it, to a :class:`.Result`; `output` are options that no deck has: out, overwrite, quiet, resume,
-        partition, frame_pieces, observers.
+    def run(self, **changes: Any) -> Any:
+        """Run it, to a :class:`.Result`.
+
+        Parameters
+        ----------
+        changes: options that no deck has (out, overwrite, quiet, resume, partition, frame_pieces, observers), and
+            parameters or tables in place of the deck's, as :meth:`changed` takes them.
 
         Raises
         ------
         SkfsinkError
             What is wrong with the deck, the folder or the run, in one line.
         """
-        if unknown := output.keys() - {f.name for f in fields(Options)}:
-            raise ParameterError(f"run of a deck takes {', '.join(OUTPUT)}; got {min(unknown)!r}")
-        arguments, options = self.check()
+        output = {name: changes.pop(name) for name in OUTPUT if name in changes}
+        arguments, options = self.changed(**changes).check()
         return find_case(self.case).function(**arguments, options=replace(options, **output))
 
-    def scene(self) -> Scene:
-        """The scene it asks for, with its mesh."""
+    def scene(self, **changes: Any) -> Scene:
+        """The scene it asks for, with its mesh; `changes` are as :meth:`changed` takes them."""
         case = find_case(self.case)
-        arguments, options = self.check()
+        arguments, options = self.changed(**changes).check()
         return case.scene({**case.default_arguments, **arguments}, options)
+
+    def changed(self, **parameters: Any) -> Deck:
+        """The deck with other parameters: numbers, text with a unit, tables (`grips=[...]`), or a function as `stop`.
+
+        A path of a mesh is sought from the current folder.
+
+        Raises
+        ------
+        ParameterError
+            There is no such parameter, or it has no such value.
+        """
+        case = find_case(self.case)
+        if unknown := [name for name in parameters if name not in case.parameters]:
+            raise ParameterError(f"{unknown[0]!r} is no parameter of {self.case}; `skfsink show {self.case}` lists "
+                                 f"them, and a run takes {', '.join(OUTPUT)} besides")
+        functions = {name: value for name, value in parameters.items() if name == "stop" and callable(value)}
+        named = {name: str(value) if isinstance(value, Path) else value for name, value in parameters.items()
+                 if name not in functions}
+        return replace(self, parameters={**self.parameters, **case.read(named), **functions})
 
     def check(self) -> tuple[dict[str, Any], Options]:
         """The arguments of the case function, those of the sample and the options; the latter are checked.
@@ -75,7 +97,8 @@ class Deck:
         """
         case = find_case(self.case)
         named = {name: str(value) if isinstance(value, Path) else value for name, value in self.parameters.items()}
-        arguments, values = case.divide(case.read(named))
+        functions = {name: named.pop(name) for name in ("stop",) if callable(named.get(name))}
+        arguments, values = case.divide({**case.read(named), **functions})
         return arguments, replace(Options(), **values, given_names=frozenset(self.parameters))
 
     def toml(self) -> str:

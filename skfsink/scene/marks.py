@@ -22,17 +22,20 @@ RISE = 1.0   # load time [s] in which a pressure that is given by its value rise
 @dataclass(frozen=True)
 class Course:
     """Mark in the annotation of a component: a number in the unit `rate`, or a ramp of points [time, value in `unit`],
-    also as the path of a CSV file.
+    also as the path of a CSV file. With `curve` a function of the load time, which stands in no deck, is kept.
     """
 
     rate: str
     unit: str
+    curve: bool = False
 
-    def read(self, value: Any) -> float | list[list[float]]:
+    def read(self, value: Any) -> float | list[list[float]] | Curve:
         """The component in plain numbers; the ParameterError is to follow its name."""
         if isinstance(value, Curve):
-            raise ParameterError(": a function of the time stands in no deck: make the scene of the deck, and run it "
-                                 "with its grips and tractions replaced, run(replace(scene, grips=...), folder)")
+            if self.curve:
+                return value
+            raise ParameterError(" takes no function of the time, as x, y and z of grips and tractions do: give a ramp "
+                                 "of points [time, value]")
         if isinstance(value, str) and value.lower().endswith(SUFFIX):
             value = read_course(Path(value), self.unit, MOST)
         if not isinstance(value, list | tuple):
@@ -53,7 +56,7 @@ class PressureCourse(Course):
 
     def read(self, value: Any) -> list[list[float]]:
         """The ramp in plain numbers."""
-        if not isinstance(value, list | tuple) and not str(value).lower().endswith(SUFFIX):
+        if not isinstance(value, list | tuple | Curve) and not str(value).lower().endswith(SUFFIX):
             value = [[0.0, 0.0], [RISE, require("", number_in("", value, self.unit), self.unit)]]
         ramp = super().read(value)
         assert isinstance(ramp, list)

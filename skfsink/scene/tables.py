@@ -20,21 +20,24 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, get_type_hints
 
+import numpy as np
+
 from ..errors import ParameterError, require
+from ..loads.curve import Curve
 from ..loads.grips import Grip, Ramp, Sliding, Traction, Velocity
 from ..loads.pressure import Filling, Pressure
 from ..loads.rotation import Rotation
 from ..material import MATERIALS, own_constants
 from ..material.regions import RegionLaw, one_bulk_modulus
-from ..meshing.cracks import InitialCrack, crack_along, crack_of_elements
+from ..meshing.cracks import InitialCrack, crack_along, crack_of_elements, of_length
 from ..meshing.sample import Sample
 from ..units import Unit, kind_and_unit
 from .course_file import SUFFIX
 from .marks import MOST, Course, Direction, Place, PressureCourse, Still, Vector, Way, plain
 from .typed import Mistake, Record
 
-__all__ = ["beside", "body_forces_of", "cracks_of", "grips_of", "number_fields", "pressures_of", "read_tables",
-           "regions_of", "tractions_of", "velocities_of"]
+__all__ = ["beside", "body_forces_of", "cracks_of", "curved", "grips_of", "in_points", "number_fields", "pressures_of",
+           "read_tables", "regions_of", "tractions_of", "velocities_of"]
 
 AXES = ("x", "y", "z")
 SINGULAR = {"body_forces": "body force", "velocities": "velocity", "fibres": "fibres of"}
@@ -53,10 +56,10 @@ def _message(kind: str, mistake: Mistake, table: Any) -> str:
 
 #: the fields of a table of each kind; the first names it, and those left out are free, zero, or as in the body
 TYPES: Mapping[str, Mapping[str, Any]] = {
-    "grips": {"boundary": str, **dict.fromkeys(AXES, Annotated[list, Course("mm/s", "mm")]),
+    "grips": {"boundary": str, **dict.fromkeys(AXES, Annotated[list, Course("mm/s", "mm", curve=True)]),
               "normal": Annotated[float, Still()], "angle": Annotated[list, Course("degree/s", "degree")],
               "centre": Annotated[list, Vector("mm")], "axis": Annotated[list, Vector("")]},
-    "tractions": {"boundary": str, **dict.fromkeys(AXES, Annotated[list, Course("MPa/s", "MPa")])},
+    "tractions": {"boundary": str, **dict.fromkeys(AXES, Annotated[list, Course("MPa/s", "MPa", curve=True)])},
     "pressures": {"boundary": str, "value": Annotated[list, PressureCourse("MPa/s", "MPa")],
                   "rate": Annotated[float, Unit("MPa/s")], "in_crack": bool},
     "fillings": {"boundary": str, "inflow": Annotated[list, Course("mm^3/s", "mm^3")],
@@ -72,7 +75,7 @@ TYPES: Mapping[str, Mapping[str, Any]] = {
                "axis": Annotated[list, Vector("")], "centre": Annotated[list, Vector("mm")],
                "normal": Annotated[list, Vector("")]},
     "cracks": {"name": str, "points": Annotated[list, Way()], "lips": str, "width": Annotated[float, Unit("mm")],
-               "elements": str}}
+               "length": Annotated[float, Unit("mm")], "elements": str}}
 #: kinds whose first field may be left out: they are of the whole body then
 WITHOUT_NAME = ("body_forces", "velocities", "fibres")
 #: fields of a table that may not be left out, where these are others than the first
@@ -112,6 +115,23 @@ def read_tables(kind: str, tables: Any) -> tuple[dict[str, Any], ...]:
     if kind not in ("tractions", "body_forces", "velocities"):
         return tuple(read)
     return tuple({name: course for name, course in table.items() if course != 0.0} for table in read)
+
+
+def curved(tables: Any) -> bool:
+    """Whether a component of one of the tables, as :func:`read_tables` gives them, is a function of the time."""
+    return any(isinstance(value, Curve) for table in tables if isinstance(table, Mapping) for value in table.values())
+
+
+def in_points(tables: Sequence[Mapping[str, Any]]) -> tuple[dict[str, Any], ...]:
+    """The tables with points in place of functions of the time, as a file has them: their polylines, of at most 1000
+    points."""
+    def points(value: Any) -> Any:
+        if not isinstance(value, Curve):
+            return value
+        kept = np.unique(np.linspace(0, len(value.times) - 1, MOST).round().astype(int))
+        return [[float(value.times[k]), float(value.values[k])] for k in kept]
+
+    return tuple({key: points(value) for key, value in table.items()} for table in tables)
 
 
 def _one_kind(table: Mapping[str, Any]) -> None:
@@ -254,9 +274,16 @@ def _crack(table: Mapping[str, Any], sample: Sample) -> InitialCrack:
     if "elements" in table:
         if "width" in table:
             raise ParameterError(f"crack {name}: width is for points; a set of elements is as wide as it is")
+        if "length" in table:
+            raise ParameterError(f"crack {name}: length is for points; a set of elements is as long as it is")
         return crack_of_elements(sample.space, name, sample.elements(table["elements"]), lips)
     width = table.get("width")
-    return crack_along(sample.space, name, table["points"], lips,
+    points = table["points"]
+    if "length" in table:
+        if sample.space.dim == 3:
+            raise ParameterError(f"crack {name}: length is for a line in the plane; a surface has its points")
+        points = of_length(points, require(f"crack {name}: length", table["length"], "mm", low=0, low_open=True))
+    return crack_along(sample.space, name, points, lips,
                        None if width is None else require(f"crack {name}: width", width, "mm", low=0, low_open=True))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+import warnings
 from collections.abc import Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
@@ -16,19 +17,28 @@ from ..meshing.kept_mesh import MESH
 from ..meshing.sample import file_sample
 from ..run.display import Display
 from ..scene.deck import Deck, read_deck
-from ..system.files import reported, write_atomic
+from ..system.files import path_of, reported, write_atomic
 from .engine import here, on_scheduler
 from .one import DECK, FAILURE, RUN, finished
 from .sweep_picture import draw
 from .table import read_rows, read_units, write_csv, write_parquet
-from .vary import combinations, read_variation, with_values
+from .vary import combinations, read_variation, values_of, with_values
 
-__all__ = ["run_sweep"]
+__all__ = ["failed_runs", "run_sweep", "sweep_rows"]
 
 
-def run_sweep(path: Path, vary: Sequence[str], out: Path, *, jobs: int = 1, scheduler: str = "", parquet: bool = False,
-              quiet: bool = False) -> list[dict[str, Any]]:
-    """Run the deck in `path` for every combination of `vary` (see :func:`.read_variation`); the rows of its table.
+def run_sweep(path: str | Path, vary: Sequence[str] | Mapping[str, Sequence[Any]], out: str | Path, *, jobs: int = 1,
+              scheduler: str = "", parquet: bool = False, quiet: bool = False) -> list[dict[str, Any]]:
+    """Run the deck in `path` for every combination of `vary`; the rows of its table, as `pandas.DataFrame` takes them.
+
+    A run that fails is a row with its message under `failure`, and the whole is warned of (UserWarning).
+
+    Parameters
+    ----------
+    path: of the deck.
+    vary: texts as of the command line (see :func:`.read_variation`), or the values by name, `{"phi": [0.1, 0.2]}`.
+    out: folder of the sweep.
+    jobs, scheduler, parquet, quiet: as of the command line.
 
     Raises
     ------
@@ -37,9 +47,31 @@ def run_sweep(path: Path, vary: Sequence[str], out: Path, *, jobs: int = 1, sche
     Interrupted
         Ctrl-C or SIGTERM: the runs that went on have left checkpoints; the same call goes on with them.
     """
+    rows = sweep_rows(path_of("path", path), vary, path_of("out", out), jobs=jobs, scheduler=scheduler,
+                      parquet=parquet, quiet=quiet)
+    if text := failed_runs(rows):
+        warnings.warn(text, stacklevel=2)
+    return rows
+
+
+def failed_runs(rows: Sequence[Mapping[str, Any]]) -> str:
+    """How many runs of a sweep have failed, and why the first; "" if none has."""
+    failed = [row for row in rows if row["failure"]]
+    others = " (and others)" if len({row["failure"] for row in failed}) > 1 else ""
+    return (f"{len(failed)} of {len(rows)} runs of the sweep failed, first {failed[0]['folder']}: "
+            f"{failed[0]['failure']}{others}; they are rows without results, and the same sweep computes them again"
+            ) if failed else ""
+
+
+def sweep_rows(path: Path, vary: Sequence[str] | Mapping[str, Sequence[Any]], out: Path, *, jobs: int = 1,
+               scheduler: str = "", parquet: bool = False, quiet: bool = False) -> list[dict[str, Any]]:
+    """As :func:`run_sweep`, without its warning."""
     require("jobs", jobs, low=1, high=256, whole=True)
     deck = read_deck(path)
-    variations = [read_variation(text, deck) for text in vary]
+    if isinstance(vary, Mapping):
+        variations = [values_of(name, values, deck) for name, values in vary.items()]
+    else:
+        variations = [read_variation(text, deck) for text in vary]
     names = [variation.name for variation in variations]
     varied = list(combinations([(variation.name, variation.values) for variation in variations]))
     folders = [out / _name(values) for values in varied]

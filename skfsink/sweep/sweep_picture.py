@@ -17,7 +17,7 @@ from ..system.files import replaced
 __all__ = ["DRAWN", "draw"]
 
 #: figures that have a panel, as far as a run has them
-DRAWN = ("onset_load", "onset_displacement", "U", "D", "tip_speed", "branches", "tear_angle")
+DRAWN = ("onset_load", "onset_displacement", "onset_G", "U", "D", "tip_speed", "branches", "tear_angle")
 SERIES = 10  # at the most that have a colour of their own
 _STYLE: dict[Any, Any] = {"font.family": "DejaVu Sans", "font.size": 10}
 
@@ -49,7 +49,8 @@ def draw(rows: Sequence[Mapping[str, Any]], varied: Sequence[str], path: Path, u
         plot.set_ylabel(_words(name, units))
         plot.grid(alpha=0.3)
         low, high = plot.get_ylim()
-        plot.set_ylim(min(0.0, low), 1.12 * high if high > 0 else 0.0)
+        nothing = not any(row.get(name) for row in rows)  # as the branches of runs that end at their onset
+        plot.set_ylim(*((0.0, 1.0) if nothing else (min(0.0, low), 1.12 * high if high > 0 else 0.0)))
         if name == "branches":
             plot.yaxis.set_major_locator(MaxNLocator(integer=True))
         if categories:

@@ -9,8 +9,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..errors import MissingExtra
 from ..results.history import History, history_units, onset_load
+from ..results.release import RELEASE, load_release
 from ..system.files import replaced, write_atomic
 from .one import FAILURE, RUN
 
@@ -25,6 +28,7 @@ FIGURES: tuple[tuple[str, str, tuple[str | int, ...]], ...] = (
     ("onset_x", "mm", ("onset", "place_mm", 0)),
     ("onset_y", "mm", ("onset", "place_mm", 1)),
     ("onset_z", "mm", ("onset", "place_mm", 2)),
+    ("onset_G", "N/mm", ("onset_G",)),
     ("U", "energy", ("energy", "U_paper_at_arrival")),
     ("D", "energy", ("energy", "D_sink_at_arrival")),
     ("tip_speed", "m/s", ("event", "mean_tip_speed_m_per_s")),
@@ -44,9 +48,10 @@ def read_rows(folders: Sequence[Path], varied: Sequence[Mapping[str, Any]]) -> l
     for folder, values in zip(folders, varied):
         path, failure = folder / RUN / "summary.json", folder / FAILURE
         summary = json.loads(path.read_text()) if path.is_file() else {}
-        parts = ([summary[name] for name in ("dynamic", "quasistatic")] if summary.get("analysis") == "both"
-                 else [summary])
-        for part in parts:
+        both = summary.get("analysis") == "both"
+        for own in ("dynamic", "quasistatic") if both else ("",):
+            found = summary[own] if both else summary
+            part = {**found, "onset_G": _onset_rate(folder / RUN / own)} if found else found
             row = {**values, "analysis": part.get("analysis"), **{name: _look(part, at) for name, _, at in FIGURES}}
             row["onset_load"] = onset_load(row["onset_load"] or {})
             row["failure"] = failure.read_text().strip() if failure.is_file() else None if part else "not finished"
@@ -54,6 +59,15 @@ def read_rows(folders: Sequence[Path], varied: Sequence[Mapping[str, Any]]) -> l
             row["folder"] = folder.name
             rows.append(row)
     return rows
+
+
+def _onset_rate(run: Path) -> float | None:
+    """Energy release rate at the onset [N/mm], of a run with the probe that follows it."""
+    if not (run / RELEASE).is_file():
+        return None
+    rates = load_release(run / RELEASE)
+    at_onset = rates["G_N_per_mm"][rates["phase"] == "onset"]
+    return float(at_onset[0]) if at_onset.size and np.isfinite(at_onset[0]) else None
 
 
 def _look(summary: Any, at: tuple[str | int, ...]) -> Any:

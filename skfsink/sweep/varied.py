@@ -38,11 +38,11 @@ class Varied:
 
 
 def varied(name: str, deck: Deck) -> Varied:
-    """The quantity of a deck that is called NAME, CONSTANT, REGION.CONSTANT or TABLE.FIELD.
+    """The quantity of a deck that is called NAME, CONSTANT, REGION.CONSTANT, CRACK.FIELD or TABLE.FIELD.
 
     NAME is a parameter of its case, with - or . for _; CONSTANT one of its law, or E, G or nu; REGION a region of it,
-    which also has the fields phi, m, bulk_modulus, density and viscosity; TABLE a kind of tables of which it has
-    one, such as fibres.
+    which also has the fields phi, m, bulk_modulus, density and viscosity; CRACK an initial
+    crack, by its name, with the fields length and width; TABLE a kind of tables of which it has one, such as fibres.
 
     Raises
     ------
@@ -63,6 +63,9 @@ def varied(name: str, deck: Deck) -> Varied:
         if tail in own_names(own):
             return _constant_of_region(name, found[0], own, tail)
         return _of_table(name, "regions", found[0], tail)
+    cracks: Sequence[Any] = deck.parameters.get("cracks", ())
+    if dot and (found := [i for i, table in enumerate(cracks) if table["name"] == head]):
+        return _of_table(name, "cracks", found[0], tail)
     if dot and len(deck.parameters.get(head, ())) == 1 and head in case.tables:
         return _of_table(name, head, 0, tail)
     others = f"; constants of {law} are {', '.join(constants)}" if constants else ""

@@ -6,6 +6,7 @@ import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from ..errors import ParameterError
 from ..scene.deck import Deck
 from .varied import Varied, varied
 
-__all__ = ["Variation", "combinations", "read_variation", "with_values"]
+__all__ = ["Variation", "combinations", "read_variation", "values_of", "with_values"]
 
 MOST = 10_000  # runs of a sweep
 
@@ -68,6 +69,21 @@ def read_variation(text: str, deck: Deck) -> Variation:
         raise ParameterError(f"--vary {what.name} from A to B takes whole numbers A <= B; got {values!r}; "
                              f"{values}:N gives N values between")
     return Variation(what, [what.kind(x) for x in range(int(low), int(high) + 1)])
+
+
+def values_of(name: str, values: Any, deck: Deck) -> Variation:
+    """What varies, from its name and its values: numbers, or text with a unit.
+
+    Raises
+    ------
+    ParameterError
+        There is no such quantity, or a value is not one of it.
+    """
+    if isinstance(values, str) or not isinstance(values, Sequence | np.ndarray) or not len(values):
+        raise ParameterError(f"{name} varies over a list of values; got {values!r:.80}")
+    what = varied(name, deck)
+    plain = values.tolist() if isinstance(values, np.ndarray) else values
+    return Variation(what, [what.read(str(value) if isinstance(value, Path) else value) for value in plain])
 
 
 def _number(what: Varied, text: str) -> Any:

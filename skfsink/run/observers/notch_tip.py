@@ -17,16 +17,16 @@ SLIT = 0.03  # net area of a surface, of all of it, below which it is the two fa
 
 
 def notch_tip(space: Space, node: int, within: float, left_out: Sequence[np.ndarray] = (),
-              mirrored: Sequence[int] = ()) -> tuple[np.ndarray, np.ndarray] | None:
+              mirrored: Sequence[int] = (), gone: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray] | None:
     """Place of the node of the surface next to a node [mm], and the direction into the body there, (dim,) each.
 
     The direction is opposite to the mean normal of the surface, with a weight that falls from half of `within` [mm] to
     0 there, in which the flanks of a notch cancel; at the tip of a slit, where all does, it is away from the faces.
     Faces all of whose nodes are in one of `left_out`, as planes of symmetry, are no surface. `mirrored` are the
-    normals (axes) of planes of symmetry that the notch is cut by: there is as much of it behind. None where there is no
-    surface within three elements.
+    normals (axes) of planes of symmetry that the notch is cut by: there is as much of it behind. `gone` are the numbers
+    of elements that the body has not, as those of an initial crack. None where no surface is within three elements.
     """
-    element, face = np.nonzero(space.outer_faces)
+    element, face = np.nonzero(space.outer_faces if gone is None or not gone.size else space.faces_without(gone))
     nodes = space.conn[element[:, None], space.face_corners[face]]
     real = ~np.any([np.zeros(len(nodes), bool), *(np.isin(nodes, some).all(axis=1) for some in left_out)], axis=0)
     element, nodes = element[real], nodes[real]

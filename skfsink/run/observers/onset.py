@@ -40,7 +40,7 @@ class Strength(Observer):
 class Onset(Observer):
     """Figures of the state at the onset, and a warning where it begins at a clamp, or away from a notch.
 
-    Memory: the `figures`; empty before the onset.
+    Memory: the `figures`; empty before the onset. An event that begins at a load time has no place where it fails.
     """
 
     kept = ("figures",)
@@ -55,7 +55,7 @@ class Onset(Observer):
         self.figures = {"displacement_mm": view.displacement, "reaction_N_per_mm": view.load,
                         "elastic_energy": ledger.elastic, "gamma_min": float(state.gamma.min()), "sink": ledger.sink,
                         "work": ledger.work, "pressure_work": ledger.pressure_work,
-                        "loading_balance": ledger.balance, **beginning(view.scene, state),
+                        "loading_balance": ledger.balance, **({} if view.on_time else beginning(view.scene, state)),
                         "ratio": ratio, "place_of_ratio": place.tolist()}
         if not view.on_time:
             check_beginning(view.scene, state)

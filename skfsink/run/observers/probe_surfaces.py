@@ -158,7 +158,7 @@ def probe_of(table: Mapping[str, Any]) -> Observer:
     choose(f"probe {name}: kind", table["kind"], KINDS)
     if table["kind"] == RELEASE_RATE:
         if "every" not in values:
-            raise ParameterError(f"probe {name}: a {RELEASE_RATE} needs every")
+            raise ParameterError(f"probe {name}: a {RELEASE_RATE} needs every, as every = \"1 us\"")
         return EnergyRelease(**_only(name, RELEASE_RATE, values, ["every", "radius", "every_passes"]))
     make = PROBE_KINDS[table["kind"]]
     if make is OpeningProbe:

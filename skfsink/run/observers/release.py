@@ -28,10 +28,10 @@ class EnergyRelease(Observer):
     """Writes G of each tip into `release.csv`, and draws it against time into `release.png`.
 
     A tip is one of the tracker's that advances; its direction is that of the last 3 l of its crack. At the onset it is
-    the notch at which the body begins to fail. On a plane of symmetry along the crack, G is that of the whole body. In
-    3D the front runs through the sheet, from one of its `faces` to the other. A row without a G says in `note` why.
-    G scatters, as elements fail one by one and gamma is solved for at intervals; its mean over the last 4 l/c_s is
-    beside it. The history of the run has the greatest G of a look, and the speed of that tip.
+    the notch, or the initial crack, at which the body begins to fail. On a plane of symmetry along the crack, G is that
+    of the whole body. In 3D the front runs through the sheet, from one of its `faces` to the other. A row without a G
+    says in `note` why. G scatters, as elements fail one by one and gamma is solved for at intervals; its mean over the
+    last 4 l/c_s is beside it. The history of the run has the greatest G of a look, and the speed of that tip.
 
     Memory: the rows so far, the last places of each tip, which tell its speed, and when it last looked; `greatest` is
     of that look.
@@ -72,16 +72,28 @@ class EnergyRelease(Observer):
         view.release = view.release or self.greatest
 
     def onset(self, view: View) -> None:
-        """G of the notch at which the body begins to fail."""
-        node = int(np.argmin(view.state.gamma))
+        """G of the notch, or of the initial crack, at which the body begins to fail."""
+        node = int(np.argmin(view.body.kept(view.state.gamma)))
+        if (tip := self._end_of_crack(view, node)) is not None:
+            self._add(view, "onset", 0, *tip, math.nan, "")
+            return
         faces = [view.scene.sample.nodes(name) for name in view.scene.faces]
         found = notch_tip(view.body.space, node, ROOT * view.tracker.l, [plane.nodes for plane in self._planes] + faces,
                           [plane.axis for plane in self._images(view, view.body.space.X[node])
-                           if isinstance(plane.axis, int)])
+                           if isinstance(plane.axis, int)], view.body.broken)
         if found is None:
             self._add(view, "onset", 0, view.body.space.X[node], None, math.nan, "it begins to fail at no notch")
         else:
             self._add(view, "onset", 0, *found, math.nan, "")
+
+    def _end_of_crack(self, view: View, node: int) -> tuple[np.ndarray, np.ndarray] | None:
+        """Place and direction of the end of an initial crack, along a line, within three elements of a node."""
+        space = view.body.space
+        near = 3 * float(space.h[(space.conn == node).any(axis=1)].max())
+        ends = [(float(np.linalg.norm(place - space.X[node])), place, direction)
+                for crack in view.scene.cracks for place, direction in crack.tips]
+        distance, place, direction = min(ends, key=lambda end: end[0], default=(math.inf, None, None))
+        return None if distance > near or place is None or direction is None else (place, direction)
 
     def look(self, view: View) -> None:
         """G of the tips that advance, as they were last found."""
