@@ -19,6 +19,7 @@ from ...fields.state import State
 from ...material.regions import by_element
 from .observer import Observer
 from .overlap import overlap
+from .places import symmetry_planes
 from .range import COARSE, check_onset
 from .tip import check_tip
 from .view import View
@@ -145,7 +146,8 @@ class Guard(Observer):
         if fails:
             self.evenness = self._even_share(loaded)
             check_onset(self.scene, begun)
-            self.notch = check_tip(self.space, int(np.argmax(loaded)), loaded)
+            planes = [plane.nodes for _, plane in symmetry_planes(self.scene)]
+            self.notch = check_tip(self.space, int(np.argmax(loaded)), loaded, planes, self.scene.cracks)
         error, allowed = state.ledger.error(state.ledger.elastic), self.scene.controls.balance_tolerance
         if not error <= allowed:
             raise InstabilityError(f"the ledger of the loading is open by {error:.2%} of the stored energy, allowed "

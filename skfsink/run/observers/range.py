@@ -16,6 +16,7 @@ from ...fem.space import Space
 from ...fields.state import State
 from ...material.regions import Region
 from ...scene.scene import Scene
+from .places import symmetry_planes
 
 __all__ = ["COARSE", "SHARP", "check_onset", "check_pressure", "check_scene"]
 
@@ -46,7 +47,7 @@ def check_scene(scene: Scene) -> None:
     if h > l / COARSE:
         log.warning("no element is finer than h = %.3g mm, l/h = %.2f (less than %g): onset and U are those of the "
                     "mesh; refine it to h <= l/3, or raise length_scale", h, l / h, COARSE)
-    angle, place = indicators.turning(space)
+    angle, place = indicators.turning(space, [plane.nodes for _, plane in symmetry_planes(scene)])
     if angle > SHARP:
         log.warning("a notch turns by %.0f degrees at one node, at %s mm (above %g): it is as sharp as elements "
                     "are small, which moves onset and U; round it with at least 4 elements", angle,
