@@ -234,7 +234,7 @@ def test_units_are_those_of_the_bodies(tmp_path: Path) -> None:
         header = (tmp_path / "sweep.csv").read_text().splitlines()[0]
         assert next(csv.reader([header]))[2:5] == ["onset_displacement [mm]", f"onset_load [{load}]",
                                                    f"greatest_load [{load}]"]
-        assert next(csv.reader([header]))[9:11] == [f"U [{energy}]", f"D [{energy}]"]
+        assert next(csv.reader([header]))[10:12] == [f"U [{energy}]", f"D [{energy}]"]
         assert [row["onset_load"] for row in rows] == [7.0] * len(some)
 
 

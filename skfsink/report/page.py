@@ -14,7 +14,7 @@ from markupsafe import Markup
 from ..errors import OutputError
 from ..results.loader import Run, load
 from ..results.tables import EMPTY, Row, Table, cost_table, energy_tables, key_table, version_table
-from ..system.files import reported, write_atomic
+from ..system.files import path_of, reported, write_atomic
 from ..system.version import __version__
 from . import charts
 from .citation import bibtex, citations
@@ -76,7 +76,7 @@ class Part:
     verdict: str
 
 
-def write_report(folders: Sequence[Path], out: Path | None = None) -> Path:
+def write_report(folders: Sequence[str | Path], out: str | Path | None = None) -> Path:
     """Write the report of one run, or of several compared, and return its path.
 
     Parameters
@@ -89,12 +89,15 @@ def write_report(folders: Sequence[Path], out: Path | None = None) -> Path:
     OutputError
         No folder, one without a run or without any event, or the file cannot be written.
     """
+    if isinstance(folders, str | Path):
+        raise OutputError(f"folders must be a list of them; got {str(folders)!r}: write [{str(folders)!r}]")
     if not folders:
         raise OutputError("name at least one folder of a run")
-    out = out or (folders[0] / "report.html" if len(folders) == 1 else Path("comparison.html"))
+    runs = [path_of("folder", folder) for folder in folders]
+    out = path_of("out", out) if out else (runs[0] / "report.html" if len(runs) == 1 else Path("comparison.html"))
     if out.is_dir():
         raise OutputError(f"the report cannot be written to {out}: that is a folder; name a file with --out")
-    write_atomic(out, report_page([load(folder) for folder in folders]))
+    write_atomic(out, report_page([load(folder) for folder in runs]))
     return out
 
 

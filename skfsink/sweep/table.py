@@ -21,6 +21,7 @@ FIGURES: tuple[tuple[str, str, tuple[str | int, ...]], ...] = (
     ("onset_displacement", "mm", ("onset", "displacement_mm")),
     ("onset_load", "load", ("onset",)),
     ("greatest_load", "load", ("loading", "greatest_load")),
+    ("onset_pressure", "MPa", ("onset", "pressure_MPa")),
     ("onset_boundary", "", ("onset", "boundary")),
     ("onset_x", "mm", ("onset", "place_mm", 0)),
     ("onset_y", "mm", ("onset", "place_mm", 1)),
