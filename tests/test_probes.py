@@ -15,7 +15,7 @@ from guarded import NOTCHED, PLAIN, Stop, scene, simulation
 from plates import contents, deck, drawing, invoke_program, plate
 
 import skfsink
-from skfsink.errors import Interrupted, MeshError, ParameterError, SkfsinkError
+from skfsink.errors import Interrupted, MeshError, OutputError, ParameterError, SkfsinkError
 from skfsink.fem.places import find_places
 from skfsink.fem.space import Space
 from skfsink.fem.surface import Surface
@@ -29,7 +29,7 @@ from skfsink.material.regions import Region
 from skfsink.meshing.sample import Sample
 from skfsink.meshing.vtu import write_mesh
 from skfsink.results.loader import load
-from skfsink.results.probes import read_probes
+from skfsink.results.probes import ProbeTable, read_probes
 from skfsink.run.compute import run
 from skfsink.run.display import Display
 from skfsink.run.observers.probe import LineProbe, MeanProbe, PointProbe
@@ -76,6 +76,12 @@ def without_pictures() -> Iterator[None]:
     """Runs draw nothing."""
     with drawing(False):
         yield
+
+
+def test_a_column_that_is_not_there_is_told_beside_those_that_are() -> None:
+    """Fails if a wrong name of a column ends in an error of Python, or the names there are are not told."""
+    with pytest.raises(OutputError, match=r"no column .displacement_x_mm.; it has s_mm, u_x_mm$"):
+        ProbeTable({"s_mm": np.zeros(1), "u_x_mm": np.zeros(1)}).look("displacement_x_mm")
 
 
 # --- places ---

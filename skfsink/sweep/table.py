@@ -52,6 +52,7 @@ def read_rows(folders: Sequence[Path], varied: Sequence[Mapping[str, Any]]) -> l
             row["onset_load"] = onset_load(row["onset_load"] or {})
             row["failure"] = failure.read_text().strip() if failure.is_file() else None if part else "not finished"
             row["verdict"] = part.get("verdict")
+            row["warnings"] = len(part["warnings"]) if "warnings" in part else None
             row["folder"] = folder.name
             rows.append(row)
     return rows
