@@ -20,7 +20,7 @@ from ...material.regions import by_element
 from .observer import Observer
 from .overlap import overlap
 from .places import symmetry_planes
-from .range import COARSE, check_onset
+from .range import COARSE, check_onset, check_volume
 from .tip import check_tip
 from .view import View
 
@@ -85,6 +85,7 @@ class Guard(Observer):
 
     def unfailed(self, view: View) -> None:
         """Look at the last state of a body that did not fail."""
+        check_volume(self.scene, view.state)
         self._check_stress(view)
         self.check_end()
 
