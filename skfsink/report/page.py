@@ -36,11 +36,12 @@ FIELDS = (
 PICTURES = (
     ("density.png", "Relative density", "Relative density γ on the deformed body at the key moments"),
     ("speed.png", "Speed of the material", "Speed of the material on the deformed body at the key moments"),
-    ("loading.png", "Loading", "Load over displacement while the body was loaded, and the least relative density"),
+    ("loading.png", "Loading", "Load over displacement, or pressure over volume, of the loading, and least density"),
     ("energies.png", "Energy ledger", "Where the energy of the event is over time, stacked, and what does not add up"),
     ("tip.png", "Tip of the crack", "Length of the crack, position and speed of its leading tip, and branches"),
     ("release.png", "Energy release rate", "Energy release rate and speed of each tip over time"),
     ("fragments.png", "Pieces", "The deformed body at the end, coloured by the pieces into which it has come apart"),
+    ("lines.png", "Lines", "What probes on lines show as the loading ends (full) and as the event does (dashed)"),
     ("probes.png", "Probes", "What the probes followed: in the loading over displacement, in the event over time"),
     *FIELDS,
     ("animation.gif", "Animation", "Relative density γ on the deformed body, moving"),
