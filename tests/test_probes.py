@@ -379,7 +379,8 @@ def test_lines_are_drawn_as_the_loading_and_the_event_end(tmp_path: Path, monkey
     s, looks = np.array([0.0, 0.5, 2.0]), 4
     stress = np.arange(12.0)
     table = ProbeTable({"phase": np.repeat(["loading", "loading", "event", "event"], 3),
-                        "step": np.repeat([1, 2, 0, 1], 3), "time_s": np.zeros(12), "grip_displacement_mm": np.zeros(12), "s_mm": np.tile(s, looks),
+                        "step": np.repeat([1, 2, 0, 1], 3), "time_s": np.zeros(12),
+                        "grip_displacement_mm": np.zeros(12), "s_mm": np.tile(s, looks),
                         "x_mm": np.tile(s, looks), "u_x_mm": -stress, "stress_xx_MPa": stress})
     line_curves.line_picture({"wall": table}, tmp_path / "lines.png")
     ways, means = kept[0].axes
