@@ -202,7 +202,7 @@ def test_alpha_outside_its_range_is_refused(alpha: float):
 
 @pytest.mark.parametrize(("arrival", "said"), [
     (None, "was still running at event_time = 0.0004 s: its tip is at (0.5, 1) mm"),
-    (15e-6, "was still running at event_time = 0.0004 s after it had arrived at 15 µs: its tip is at (0.5, 1) mm")])
+    (15e-6, "was still running at event_time = 0.0004 s, after it had arrived at 15 µs: its tip is at (0.5, 1) mm")])
 def test_a_crack_that_runs_on_after_its_arrival_is_said_to_have_arrived(arrival: float | None, said: str) -> None:
     """Fails if the verdict on a ring that has burst, and is held in one place, does not say so."""
     tracker = SimpleNamespace(cracked_at=np.zeros(3), separated=False, arrival=arrival)
