@@ -40,6 +40,23 @@ def test_crack_arrives_at_the_opposite_edge(kind: str) -> None:
     assert track.separated
 
 
+def test_crack_arrives_through_a_thin_wall() -> None:
+    """Fails if a crack through a wall of 2.5 l does not arrive, arrives before it is through, or if one that comes out
+    of the side that it started from, or cuts off a corner, counts as through."""
+    space = Space(grid("quad", (80, 5), (4.0, 0.25)))
+    X = space.X
+    rim = np.flatnonzero((X[:, 0] < 1e-9) | (X[:, 0] > 4 - 1e-9) | (X[:, 1] < 1e-9) | (X[:, 1] > 0.25 - 1e-9))
+
+    def arrives(*pieces: tuple[float, float, float, float]) -> bool:
+        cut = [(X[:, 0] >= x0 - 1e-9) & (X[:, 0] <= x1 + 1e-9) & (X[:, 1] >= y0 - 1e-9) & (X[:, 1] <= y1 + 1e-9)
+               for x0, x1, y0, y1 in pieces]
+        return CrackTracker(space, L, CS, [], rim).mark(1e-6, np.where(np.any(cut, axis=0), 0.0, 1.0))
+
+    assert arrives((2.0, 2.0, 0.0, 0.25)) and not arrives((2.0, 2.0, 0.0, 0.2))
+    assert not arrives((1.9, 1.9, 0.0, 0.1), (1.9, 2.1, 0.1, 0.1), (2.1, 2.1, 0.0, 0.1))
+    assert not arrives((0.2, 0.2, 0.0, 0.15), (0.0, 0.2, 0.15, 0.15))
+
+
 def test_cracks_arrive_when_they_meet() -> None:
     """Fails if cracks that come from two edges are waited for at a third, which they never reach."""
     track, space = tracker()

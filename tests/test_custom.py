@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ from skfsink.material import (
     MATERIALS,
     Gent,
     HolzapfelGasserOgden,
+    SinkLaw,
     constants_text,
     own_constants,
     read_constants,
@@ -172,6 +174,31 @@ def test_a_deck_with_engineering_constants_is_stored_in_those_of_the_law(folder:
         assert (folder / "second" / name).read_bytes() == (folder / "first" / name).read_bytes()
 
 
+def test_a_mesh_in_metres_is_told_before_its_crack_is_sought(folder: Path) -> None:
+    """Fails if a body in metres with a crack in mm is told that the crack leaves it, which hides the cause."""
+    mesh = plate()
+    write_mesh(folder / "plate.vtu", meshio.Mesh(1e-3 * mesh.points, mesh.cells))
+    crack = '[[cracks]]\nname = "cut"\npoints = [["0 mm", "2 mm"], ["1 mm", "2 mm"]]\nlips = "whole"\n'
+    code, err, _ = invoke_program("run", deck(folder, HEAD + GRIPS + crack), "--out", "run")
+    assert code == 2 and "multiply those of a mesh in m by 1000 (skfsink mesh IN OUT --from m)" in " ".join(err.split())
+
+
+def test_constants_of_a_command_have_units() -> None:
+    """Fails if a quantity is no constant of `skfsink material`, is taken without its unit, or has another's."""
+    shown = invoke_program("material", "gent", "--mu", "300 kPa", "--density", "1.1 g/cm^3")
+    assert shown[0] == 0 and "mu 0.3" in str(shown) and "density 1100" in str(shown)
+    assert invoke_program("material", "gent", "--mu", "0.3", "--density", "1100")[1:] == shown[1:]
+    assert "mu must be a quantity in MPa" in str(invoke_program("material", "gent", "--mu", "3 kg"))
+
+
+def test_a_region_without_a_law_has_that_of_the_body() -> None:
+    """Fails if a region of another strength alone has another law, or other constants, than the body around it."""
+    body, sink = Gent(mu=0.02, limit=5.0), SinkLaw(phi=0.3, m=8.0, length_scale=0.2)
+    assert RegionLaw("strong", phi=10.0).laws(body, sink) == (body, replace(sink, phi=10.0))
+    assert RegionLaw("heavy", density=2e3).laws(body, sink) == (replace(body, density=2e3), sink)
+    assert regions_of([{"name": "strong", "phi": "10 MPa"}])[0].laws(body, sink)[0] == body
+
+
 @pytest.mark.parametrize(("options", "said"), [
     ({"bulk_modulus": 400.0}, "say the same"), ({"given_names": frozenset({"bulk_modulus"})}, "say the same")])
 def test_two_bulk_moduli_are_refused(options: dict[str, Any], said: str) -> None:
@@ -248,6 +275,7 @@ def tomllib_text(data: dict[str, Any]) -> str:
     ("grips = 5", "grips must be tables [[grips]]"), ("[grips]\nboundary = 'top'", "grips must be tables [[grips]]"),
     ("[[tractions]]\nboundary = 'top'\ny = '1 MPa'", "traction top, y must be a quantity in MPa/s"),
     ("[[regions]]\nname = 'a'\nmaterial = 'steel'", "region a: material must be one of"),
+    ("[[regions]]\nname = 'a'\nconstants = 'mu = 1'", "region a: constants 'mu = 1' are those of no law: give a"),
     ("[[regions]]\nname = 'a'\nphi = '1 mm'", "region a, phi must be a quantity in MPa"),
     ("[parameters]\ngrips = []", "grips are tables beside the parameters"),
     ("[[loads]]\n", "unknown key 'loads'; the keys are case, parameters")])

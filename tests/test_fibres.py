@@ -122,6 +122,31 @@ def test_a_region_has_its_own_and_a_deck_describes_them(ring: Path) -> None:
     assert scene(ring, {"array": "cells"}).fingerprint != scene(ring, {"array": "points"}).fingerprint
 
 
+def test_a_region_of_the_same_law_has_the_directions_of_the_body(ring: Path) -> None:
+    """Fails if a region that differs in its strength alone loses the directions of the body, or gets one element's of
+    another."""
+    everywhere = scene(ring, {"direction": "circumferential"}).fibres
+    assert everywhere is not None
+    for region in ({"name": "half", "phi": 2.0}, {"name": "half", **HGO, "phi": 2.0}):
+        found = scene(ring, {"direction": "circumferential"}, regions=(region,)).fibres
+        np.testing.assert_array_equal(found, everywhere)
+
+
+@pytest.mark.parametrize(("fibres", "regions", "said"), [
+    ({"direction": "circumferential"}, ({"name": "half", "material": "hgo", "constants": "c = 1 kPa", "phi": 1.0},),
+     "fibres of region half have no direction, .* with region = 'half', or an axis in the constants"),
+    ({"region": "half", "azimuth": 20}, ({"name": "half", "material": "hgo", "constants": "c = 1 kPa", "phi": 1.0},),
+     "fibres of the body have no direction, .* without a region, or an axis")])
+def test_a_part_without_a_direction_is_refused(ring: Path, fibres: dict[str, Any], regions: Any, said: str) -> None:
+    """Fails if fibres lie along x in silence where the deck directs those of another part, or if an axis of the
+    constants does not count as a direction."""
+    with pytest.raises(ParameterError, match=said):
+        scene(ring, fibres, regions=regions)
+    with_axis = tuple({**region, "constants": "c = 1 kPa, axis = [0, 1, 0]"} for region in regions)
+    constants = "c = 2 kPa, axis = [1, 1, 0]" if "region" in fibres else "c = 2 kPa"
+    assert scene(ring, fibres, regions=with_axis, constants=constants).fibres is not None
+
+
 def test_circumference_of_a_body_of_revolution(tmp_path: Path) -> None:
     """Fails if the line of a body of revolution is not its axis: fibres around it point out of the half plane."""
     x, y = np.meshgrid(np.linspace(1, 2, 4), np.linspace(0, 1, 4), indexing="ij")

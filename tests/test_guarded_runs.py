@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
-from guarded import NOTCHED, PLAIN, SHARP, event
+from guarded import NOTCHED, PLAIN, SHARP, event, scene
 
 from skfsink.errors import ConvergenceError, InstabilityError, ParameterError
 from skfsink.fields.density import DensitySolver
@@ -197,3 +198,16 @@ def test_alpha_outside_its_range_is_refused(alpha: float):
     """Fails if an alpha is taken with which the scheme is unstable, or dissipates low modes."""
     with pytest.raises(ParameterError, match=r"hht_alpha must be a finite number in \[-0.333333, 0\]"):
         HHTControls(alpha=alpha)
+
+
+@pytest.mark.parametrize(("arrival", "said"), [
+    (None, "was still running at event_time = 0.0004 s: its tip is at (0.5, 1) mm"),
+    (15e-6, "was still running at event_time = 0.0004 s, after it had arrived at 15 µs: its tip is at (0.5, 1) mm")])
+def test_a_crack_that_runs_on_after_its_arrival_is_said_to_have_arrived(arrival: float | None, said: str) -> None:
+    """Fails if the verdict on a ring that has burst, and is held in one place, does not say so."""
+    tracker = SimpleNamespace(cracked_at=np.zeros(3), separated=False, arrival=arrival)
+    row = {"tip_x_mm": 0.5, "tip_y_mm": 1.0, "tips": 1}
+    sim: Any = SimpleNamespace(state=SimpleNamespace(time=1e-4), crack=SimpleNamespace(tracker=tracker), unfailed="",
+                               dissolved=False, ended="", guard=SimpleNamespace(even=False),
+                               history=SimpleNamespace(rows=[row]))
+    assert verdict(scene(), sim).endswith(said)

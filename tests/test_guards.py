@@ -15,11 +15,11 @@ from guarded import NOTCHED, SHARP, Watched, scene
 from skfsink.errors import InstabilityError
 from skfsink.fem.space import Space
 from skfsink.fields.energy import Ledger
-from skfsink.material import AAA
+from skfsink.material import AAA, SinkLaw
 from skfsink.meshing.sample import Sample
 from skfsink.methods.controls import ExplicitControls, HHTControls
 from skfsink.run.notes import Notes
-from skfsink.run.observers.range import check_scene
+from skfsink.run.observers.range import check_scene, check_volume
 from skfsink.scene.scene import Scene
 from skfsink.study.blocks import block
 
@@ -69,6 +69,7 @@ def squeezed(share: float) -> Sample:
     (lambda: scene(material=AAA(bulk_modulus=49 * MU), element="plain"), None),
     (lambda: scene(material=AAA(bulk_modulus=1.9e4 * MU)), None),
     (lambda: scene(material=AAA(bulk_modulus=1e5 * MU)), r"k/mu = 1e\+05 is so large .* bulk_modulus 1.23e\+03"),
+    (lambda: scene(material=AAA(bulk_modulus=1e5 * MU), law=SinkLaw(phi=100.0)), r"is so large .* phi asks for a bulk"),
     (lambda: scene(block(12)), None),
     (lambda: scene(block(11)), r"no element is finer than h = 0.0909 mm, l/h = 1.10 .* refine it to h <= l/3"),
     (lambda: scene(block(16, notch=0.4, width=0.0)), r"a notch turns by 180 degrees at one node, at \(0.375, 0.5\)"),
@@ -100,6 +101,22 @@ def test_onset_in_coarse_elements_is_warned_of(caplog: pytest.LogCaptureFixture)
     watched.state.gamma[right] = 0.8
     watched.guard.check_onset(watched.state)
     assert "where it begins to fail, at (1, 0.5) mm" in caplog.text and "refine it there to h <= l/3" in caplog.text
+
+
+@pytest.mark.parametrize(("k", "swelling", "element", "told"), [
+    (100 * MU, 0.012, "jbar", True), (100 * MU, 0.008, "jbar", False), (40 * MU, 0.012, "jbar", False),
+    (100 * MU, 0.012, "planestress", False)])
+def test_a_change_of_volume_is_warned_of(k: float, swelling: float, element: str, told: bool,
+                                         caplog: pytest.LogCaptureFixture) -> None:
+    """Fails if a body that is to be incompressible swells in silence, or one that is compressible, or a sheet, is told;
+    or if the bulk modulus that it names leaves more than 0.2 % of such a pressure."""
+    watched = Watched(scene(material=AAA(bulk_modulus=k), element=element))
+    watched.state.u = watched.scene.sample.space.X * (np.sqrt(1 + swelling) - 1)
+    check_volume(watched.scene, watched.state)
+    assert len(caplog.messages) == told
+    if told:
+        assert "the volume has changed by 1.2 % on average (above 1), though k/mu = 100" in caplog.text
+        assert f"raise it to {k * swelling / 0.002:.2g} MPa" in caplog.text
 
 
 def test_alternating_pressures_are_warned_of(caplog: pytest.LogCaptureFixture):

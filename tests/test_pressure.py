@@ -15,6 +15,7 @@ import pytest
 import skfem
 from bodies import Loadable, box, ends, wavy
 from guarded import Stop, simulation
+from matplotlib.figure import Figure
 from plates import deck, invoke_program
 from scipy.integrate import quad
 
@@ -38,6 +39,8 @@ from skfsink.methods.controls import ExplicitControls, HHTControls
 from skfsink.methods.explicit import Explicit
 from skfsink.methods.hht import HHT
 from skfsink.methods.newton import Newton
+from skfsink.pictures import plot
+from skfsink.results.history import Table
 from skfsink.results.loader import load
 from skfsink.run.display import Display
 from skfsink.run.observers.probe_surfaces import VolumeProbe
@@ -431,6 +434,46 @@ def test_a_deck_bursts_a_ring(ring: Path) -> None:
     np.testing.assert_allclose(history["grip_displacement_mm"], history["swept_volume"] / (np.pi / 2), rtol=3e-3)
     assert (history["reaction_N_per_mm"][loading] > p[loading] * np.pi / 2).all()
     assert run.summary["energy"]["pressure_work"] > 0
+
+
+@pytest.mark.parametrize("load_text", [
+    '[[pressures]]\nboundary = "inner"\nrate = "75 mmHg/s"\n',
+    '[[fillings]]\nboundary = "inner"\ninflow = "0.01 mm^3/s"\ncompliance = "0.1 mm^3/kPa"\n'])
+def test_pressure_at_the_onset_is_told(ring: Path, load_text: str) -> None:
+    """Fails if summary, table or the line of the onset lack the pressure, have another than the history, or the wrong
+    factor to mmHg: 1 kPa is 7.50062 of them."""
+    text = RING.partition("[[pressures]]")[0] + load_text
+    code, out, err = invoke_program("run", deck(ring, text.replace("20 µs", "1 ns")), "--out", "run")
+    assert code == 0, err
+    run = load("run")
+    rows = run.history["phase"] == "loading"
+    p = run.history["pressure_MPa"][rows]
+    assert run.summary["onset"]["pressure_MPa"] == pytest.approx(p[-1], rel=1e-9)
+    assert run.summary["loading"]["greatest_pressure_MPa"] == pytest.approx(p.max(), rel=1e-9) and p.max() > 0.01
+    cells = {(row.name, row.unit): row.cells[0] for row in run.table().rows}
+    assert float(cells["pressure at the onset", "kPa"]) == pytest.approx(1e3 * p[-1], rel=1e-3)
+    assert float(cells["pressure at the onset", "mmHg"]) == pytest.approx(7500.62 * p[-1], rel=1e-3)
+    assert f"under {1e3 * p[-1]:.4g} kPa ({7500.61576 * p[-1]:.4g} mmHg)" in out + err
+
+
+def test_loading_of_a_vessel_is_drawn_as_pressure_over_volume(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fails if the picture of a body under pressure shows no pressure, or that of one whose grips move no load."""
+    kept: list[Figure] = []
+    monkeypatch.setattr(plot, "Figure", lambda *a, **k: kept.append(Figure(*a, **k)) or kept[-1])
+    swept, p = np.array([0.0, 1.0, 2.0]), np.array([0.0, 0.02, 0.03])
+    table = {"phase": np.array(["loading"] * 3), "gamma_min": np.ones(3), "reaction_N_per_mm": 9 * p,
+             "swept_volume": swept, "pressure_MPa": p}
+    for displacement, labels in ((swept / 5, ["pressure (kPa)"]),
+                                 (np.array([0.0, 1.0, 1.0]), ["load (N)", "pressure (kPa)"])):
+        plot.loading_picture(Table({**table, "grip_displacement_mm": displacement}, 3), tmp_path / "a.png")
+        above = kept[-1].axes[:len(labels)]
+        assert [ax.get_ylabel() for ax in above] == labels
+        np.testing.assert_allclose(above[-1].lines[0].get_xydata()[1:], np.column_stack([swept, 1e3 * p]))
+        (beside,) = above[-1].child_axes
+        assert beside.get_ylabel() == "mmHg"
+    still = Table({**table, "grip_displacement_mm": swept, "pressure_MPa": 0 * p}, 3)
+    plot.loading_picture(still, tmp_path / "a.png")
+    assert kept[-1].axes[0].get_ylabel() == "load (N)" and len(kept[-1].axes) == 2
 
 
 @pytest.mark.parametrize(("text", "integrator"), [

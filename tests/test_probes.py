@@ -12,10 +12,11 @@ import pytest
 import skfem
 from bodies import box, distorted, grid
 from guarded import NOTCHED, PLAIN, Stop, scene, simulation
+from matplotlib.figure import Figure
 from plates import contents, deck, drawing, invoke_program, plate
 
 import skfsink
-from skfsink.errors import Interrupted, MeshError, ParameterError, SkfsinkError
+from skfsink.errors import Interrupted, MeshError, OutputError, ParameterError, SkfsinkError
 from skfsink.fem.places import find_places
 from skfsink.fem.space import Space
 from skfsink.fem.surface import Surface
@@ -28,8 +29,9 @@ from skfsink.material import AAA, Material, NeoHookean
 from skfsink.material.regions import Region
 from skfsink.meshing.sample import Sample
 from skfsink.meshing.vtu import write_mesh
+from skfsink.pictures import line_curves
 from skfsink.results.loader import load
-from skfsink.results.probes import read_probes
+from skfsink.results.probes import ProbeTable, read_probes
 from skfsink.run.compute import run
 from skfsink.run.display import Display
 from skfsink.run.observers.probe import LineProbe, MeanProbe, PointProbe
@@ -76,6 +78,12 @@ def without_pictures() -> Iterator[None]:
     """Runs draw nothing."""
     with drawing(False):
         yield
+
+
+def test_a_column_that_is_not_there_is_told_beside_those_that_are() -> None:
+    """Fails if a wrong name of a column ends in an error of Python, or the names there are are not told."""
+    with pytest.raises(OutputError, match=r"no column .displacement_x_mm.; it has s_mm, u_x_mm$"):
+        ProbeTable({"s_mm": np.zeros(1), "u_x_mm": np.zeros(1)}).look("displacement_x_mm")
 
 
 # --- places ---
@@ -355,12 +363,34 @@ def test_probes_of_a_deck(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
 
 
 def test_the_picture_of_probes(tmp_path: Path, pictures: None) -> None:
-    """Fails if a run with probes leaves no picture of them, or one without any leaves one; a line alone has none."""
+    """Fails if a run with probes leaves no picture of them, or one of the other kind."""
     s = scene(NOTCHED.sample, event_time=4e-7, record_every=1e-7)
     for name, probe in (("line", LineProbe("l", (0.6, 0.5), (1.0, 0.5), 3)), ("point", PointProbe("p", (0.6, 0.5)))):
         run(s, tmp_path / name, [probe], quiet=True)
     assert (tmp_path / "point" / "probes.png").stat().st_size > 2e4 and not (tmp_path / "line" / "probes.png").exists()
+    assert (tmp_path / "line" / "lines.png").stat().st_size > 2e4 and not (tmp_path / "point" / "lines.png").exists()
     assert (tmp_path / "line" / "density.png").exists()
+
+
+def test_lines_are_drawn_as_the_loading_and_the_event_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fails if another look than the last of its phase is drawn, over another distance, or means as if interpolated."""
+    kept: list[Figure] = []
+    monkeypatch.setattr(line_curves, "Figure", lambda *a, **k: kept.append(Figure(*a, **k)) or kept[-1])
+    s, looks = np.array([0.0, 0.5, 2.0]), 4
+    stress = np.arange(12.0)
+    table = ProbeTable({"phase": np.repeat(["loading", "loading", "event", "event"], 3),
+                        "step": np.repeat([1, 2, 0, 1], 3), "time_s": np.zeros(12),
+                        "grip_displacement_mm": np.zeros(12), "s_mm": np.tile(s, looks),
+                        "x_mm": np.tile(s, looks), "u_x_mm": -stress, "stress_xx_MPa": stress})
+    line_curves.line_picture({"wall": table}, tmp_path / "lines.png")
+    ways, means = kept[0].axes
+    assert (ways.get_ylabel(), means.get_ylabel()) == ("wall (mm)", "wall (MPa)")
+    for ax, sign, steps in ((ways, -1, "default"), (means, 1, "steps-mid")):
+        assert [line.get_ydata().tolist() for line in ax.lines] == [[sign * x for x in (3, 4, 5)],
+                                                                    [sign * x for x in (9, 10, 11)]]
+        assert all(line.get_xdata().tolist() == s.tolist() and line.get_drawstyle() == steps for line in ax.lines)
+    line_curves.line_picture({}, tmp_path / "none.png")
+    assert not (tmp_path / "none.png").exists()
 
 
 def test_quasistatic_runs_and_both(tmp_path: Path) -> None:

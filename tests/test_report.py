@@ -376,6 +376,13 @@ def seen(browser: Any, path: Path, width: int) -> dict[str, Any]:
     return found | {"said": said}
 
 
+def test_folders_of_a_report_may_be_texts(folder: Path, tmp_path: Path) -> None:
+    """Fails if a folder that is a text, or a single one without a list, ends in an error of Python."""
+    assert write_report([str(folder)], str(tmp_path / "page.html")).is_file()
+    with pytest.raises(OutputError, match=re.escape(f"write ['{folder}']")):
+        write_report(str(folder))
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("width", [1280, 360])
 def test_a_browser_shows_the_report(folder: Path, browser: Any, tmp_path: Path, width: int) -> None:

@@ -263,16 +263,18 @@ def test_units_are_those_of_the_bodies(tmp_path: Path) -> None:
         key = "reaction_N" if (dim, schema) == (3, 2) else "reaction_N_per_mm"
         summary = {"case": "x", "analysis": "dynamic", "onset": {key: 7.0}, "energy": {"U_paper_at_arrival": 1.0}}
         if schema == 2:
+            summary["warnings"] = ["one", "another"]
             summary["units"] = {"load": load, "energy": energy}
         (run / "summary.json").write_text(json.dumps(summary))
     for some, load, energy in ((folders[:1], "N", "N mm"), (folders[:2], "N", "N mm"), (folders[2:], "N/mm", "N mm/mm"),
                                (folders, "N/mm, in space N", "N mm/mm, in space N mm")):
         rows, units = read_rows(some, [{"seed": 1}] * len(some)), read_units(some)
         write_csv(rows, tmp_path / "sweep.csv", units)
+        assert [row["warnings"] for row in rows] == [None if folder.name == "old" else 2 for folder in some]
         header = (tmp_path / "sweep.csv").read_text().splitlines()[0]
         assert next(csv.reader([header]))[2:5] == ["onset_displacement [mm]", f"onset_load [{load}]",
                                                    f"greatest_load [{load}]"]
-        assert next(csv.reader([header]))[9:12] == ["onset_G [N/mm]", f"U [{energy}]", f"D [{energy}]"]
+        assert next(csv.reader([header]))[10:13] == ["onset_G [N/mm]", f"U [{energy}]", f"D [{energy}]"]
         assert [row["onset_load"] for row in rows] == [7.0] * len(some)
 
 

@@ -13,8 +13,9 @@ import pytest
 import skfem
 from guarded import NOTCHED, Watched, scene, simulation
 
-from skfsink.fem.indicators import corner_near
+from skfsink.fem.indicators import corner_near, turning
 from skfsink.fem.space import Space
+from skfsink.meshing.cracks import crack_along
 from skfsink.meshing.sample import Sample, mesh_sample
 from skfsink.meshing.sweeping import swept
 from skfsink.run.observers import tip
@@ -128,6 +129,64 @@ def test_sharp_corner_is_warned_of(caplog: pytest.LogCaptureFixture) -> None:
     watched = failing(block(15, notch=0.4, width=0.06), 0.42, 0.5)
     assert [t for t in caplog.messages if "begins to fail at a sharp corner, which turns by 90 degrees" in t]
     assert watched.guard.notch["late"] is None and watched.guard.notch["radius_mm"] is None
+
+
+def upper_half(sample: Sample) -> tuple[Space, np.ndarray]:
+    """The half of a block above mid-height, and its nodes on that line ahead of the notch."""
+    space = sample.space
+    kept = np.flatnonzero(space.X[space.conn].mean(axis=1)[:, 1] > 0.5)
+    half = Space(space.mesh.restrict(kept))
+    tip_x = space.X[sample.nodes("notch"), 0].max()
+    return half, np.flatnonzero((abs(half.X[:, 1] - 0.5) < 1e-9) & (half.X[:, 0] > tip_x - 1e-9))
+
+
+@pytest.mark.parametrize(("width", "rounded", "angle"), [(0.0, False, 180.0), (0.3, True, 0.0)])
+def test_notch_that_a_plane_of_symmetry_halves_is_that_of_the_whole(width: float, rounded: bool, angle: float) -> None:
+    """Fails if a slit that ends at a plane of symmetry passes for no notch, or a round tip there for a sharper one."""
+    sample = block(20, notch=0.4, width=width, rounded=rounded)
+    half, plane = upper_half(sample)
+    of_half, place = turning(half, [plane])
+    assert of_half == pytest.approx(turning(sample.space)[0]) and (angle == 0.0 or of_half == pytest.approx(angle))
+    corners = [corner_near(space, at(space, place[0] + 0.01, 0.51), planes)
+               for space, planes in ((sample.space, []), (half, [plane]))]
+    whole, halved = corners
+    assert whole is not None and halved is not None
+    assert halved.angle == pytest.approx(whole.angle) and halved.radius == pytest.approx(whole.radius)
+    assert halved.thickness == pytest.approx(whole.thickness)
+    np.testing.assert_allclose(halved.place, whole.place, atol=1e-9)
+    np.testing.assert_allclose(halved.into, whole.into, atol=1e-9)
+    if not width:
+        np.testing.assert_allclose(whole.into, [1.0, 0.0], atol=1e-9)
+        assert turning(half)[0] < 1.0
+
+
+def test_flat_side_of_which_a_plane_of_symmetry_is_a_part_is_no_notch() -> None:
+    """Fails if the nodes on a plane of symmetry, or its end at a free side, count as turning inwards."""
+    space = block(10).space
+    assert turning(space, [np.flatnonzero(space.X[:, 1] < 1e-9)])[0] < 1e-6
+
+
+@pytest.mark.parametrize("lips", ["whole", "broken"])
+def test_end_of_an_initial_crack_is_warned_of(lips: str, caplog: pytest.LogCaptureFixture) -> None:
+    """Fails if an onset at the end of a crack that is a band of elements passes for one that the mesh resolves."""
+    sample = block(15)
+    crack = crack_along(sample.space, "cut", [(0.0, 0.5), (0.4, 0.5)], lips)
+    watched = Watched(dataclasses.replace(scene(sample), cracks=(crack,)))
+    watched.state.W_max[at(sample.space, 0.43, 0.5)] = 1.0
+    watched.guard.check_onset(watched.state)
+    (text,) = [t for t in caplog.messages if "begins to fail at" in t]
+    assert "at the crack cut, at (0.4, 0." in text and "h = 0.0667 mm" in text and "equal elements" in text
+    assert watched.guard.notch["late"] is None and watched.guard.notch["thickness_mm"] == pytest.approx(1 / 15)
+
+
+def test_onset_away_from_an_initial_crack_is_not_its_end(caplog: pytest.LogCaptureFixture) -> None:
+    """Fails if a body that fails elsewhere is said to begin at its crack."""
+    sample = block(15)
+    crack = crack_along(sample.space, "cut", [(0.0, 0.5), (0.4, 0.5)], "whole")
+    watched = Watched(dataclasses.replace(scene(sample), cracks=(crack,)))
+    watched.state.W_max[at(sample.space, 0.8, 0.2)] = 1.0
+    watched.guard.check_onset(watched.state)
+    assert not [t for t in caplog.messages if "at the crack" in t] and watched.guard.notch == {}
 
 
 def test_evenly_loaded_body_without_a_notch_is_not_warned_of(caplog: pytest.LogCaptureFixture) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -29,10 +30,15 @@ def pages() -> dict[str, str]:
     """The pages, by their path in docs."""
     texts = {name: _parts(name) for name in NAMES}
     rows = [f"| [![{title}](images/examples/{name}.png)](examples/{name}.md) | [{title}](examples/{name}.md)<br>"
-            f"{text.split('. ')[0].rstrip('.').replace('|', chr(92) + '|')}. |"
+            f"{_first_sentence(text).replace('|', chr(92) + '|')} |"
             for name, (title, text, _) in texts.items()]
     index = "\n".join([HEAD, "| | |", "|---|---|", *(row.replace("\n", " ") for row in rows), ""])
     return {"examples.md": index, **{f"examples/{name}.md": _page(name, *parts) for name, parts in texts.items()}}
+
+
+def _first_sentence(text: str) -> str:
+    """The first sentence, with its full stop; "Sec. 5.1" does not end one."""
+    return re.split(r"(?<!Sec)\.\s", text)[0].rstrip(".") + "."
 
 
 def _parts(name: str) -> tuple[str, str, str]:

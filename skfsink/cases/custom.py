@@ -17,6 +17,7 @@ from ..loads.pressure import Filling, Pressure
 from ..material.regions import Region, RegionLaw, by_element
 from ..meshing.sample import file_sample
 from ..results.result import Result
+from ..run.checks import check_size
 from ..run.compute import run_case
 from ..run.keywords import case_function
 from ..run.request import check_options
@@ -159,6 +160,7 @@ def _scene(arguments: dict[str, Any], options: Options) -> Scene:
                     for law in regions_of(arguments["regions"]))
     material, regions = with_fibres(arguments.get("fibres", ()), sample, material, regions,
                                     options.element == "axisymmetric")
+    check_size(sample.space, sink_law.length_scale)  # before a crack that is not found in a body of another unit
     dim = sample.space.dim
     rho0 = by_element(sample.space.n_elements, material.rho0, regions, lambda region: region.material.rho0)
     weights = tuple(partial(BodyForce, rho0=rho0, rate=rate, elements=sample.elements(name) if name else None)

@@ -30,8 +30,8 @@ def material(name: str, /, *, phi: float | None = None, m: float | None = None, 
     out
         Picture to write: a .png, .pdf or .svg file.
     constants
-        Constants of the law by name, such as --mu 0.3, or --E 0.9 --nu 0.499; vectors as --axis 1,0,0. An unknown one
-        lists those there are.
+        Constants of the law by name, such as --mu 0.3 or --mu "300 kPa", or --E 0.9 --nu 0.499; vectors as --axis
+        1,0,0. A plain number is in the unit of the constant, MPa. An unknown one lists those there are.
     """
     from dataclasses import fields
 
@@ -50,7 +50,7 @@ def material(name: str, /, *, phi: float | None = None, m: float | None = None, 
         if "bulk_modulus" in found:
             raise ParameterError("bulk_modulus and nu say the same: give one of them")
         found = {**beside, **read_constants(name, ", ".join(f"{key} = {text}" for key, text in found.items()))}
-    chosen = material_from(name, {key: _value(text) for key, text in found.items()})
+    chosen = material_from(name, {key: _value(key, text) for key, text in found.items()})
     limiter = limiter_of(name)
     law = SinkLaw(phi=limiter.phi if phi is None else phi, m=limiter.m if m is None else m)
     strengths = peaks(chosen, law)
@@ -88,14 +88,19 @@ def _text(value: Any) -> str:
     return f"({', '.join(f'{x:g}' for x in value)})" if isinstance(value, tuple) else f"{value:g}"
 
 
-def _value(text: Any) -> Any:
-    """The number or vector in the text, or the text itself: the material then says what is allowed."""
+def _value(name: str, text: Any) -> Any:
+    """The number, quantity or vector in the text, or the text itself: the material then says what is allowed."""
+    from ..material.constants import constant_unit
+    from ..material.materials import UNITS
+    from ..units import in_unit
+
     if not isinstance(text, str):
         return text
     try:
         numbers = tuple(float(part) for part in text.split(","))
     except ValueError:
-        return text
+        unit = UNITS.get(name, constant_unit(name))
+        return in_unit(name, text, unit) if unit else text
     return numbers[0] if len(numbers) == 1 else numbers
 
 

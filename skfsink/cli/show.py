@@ -23,7 +23,7 @@ EXAMPLES = {
     "body_forces": ('[[body_forces]]', 'y = [["0 s", "0 m/s^2"], ["1 s", "-9.81 m/s^2"]]'),
     "velocities": ('[[velocities]]', 'region = "ball"         # left out: the body', 'x = "2 m/s"'),
     "fibres": ('[[fibres]]', 'direction = "circumferential"   # or "axial", a vector; or array = "vectors"',
-               'normal = [0, 0, 1]', 'region = "adventitia"     # left out: the body'),
+               'normal = [0, 0, 1]', 'region = "adventitia"     # left out: what is in no region, or of the same law'),
     "regions": ('[[regions]]', 'name = "inclusion"', 'material = "neo-hookean"', 'constants = "mu = 2 MPa"',
                 'phi = "1 MPa"          # also m, bulk_modulus, density'),
     "cracks": ('[[cracks]]', 'name = "slit"',

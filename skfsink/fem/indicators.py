@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +11,7 @@ from .graph import node_key
 from .space import Space
 
 __all__ = ["Corner", "alternation", "below", "corner_near", "element_pressure", "greatest_stretch", "inverted",
-           "mean_density", "size_near", "turning", "turnings"]
+           "mean_density", "outer_faces", "size_near", "turning", "turnings"]
 
 
 class Corner(NamedTuple):
@@ -30,25 +31,54 @@ class Corner(NamedTuple):
     into: np.ndarray
 
 
-def turning(space: Space) -> tuple[float, np.ndarray]:
+def outer_faces(space: Space, planes: Sequence[np.ndarray] = (), gone: np.ndarray | None = None) -> np.ndarray:
+    """Mask (ne, 2 dim) of the faces on the surface of a body, numbered as `space.outer_faces`.
+
+    Parameters
+    ----------
+    planes: nodes of each plane of symmetry: faces in it are none of the surface, since the body goes on behind them.
+    gone: numbers of elements that the body lacks; the faces of others that met them are of its surface.
+    """
+    mask = space.outer_faces.copy()
+    if gone is not None and gone.size:
+        here = np.ones(space.n_elements, bool)
+        here[gone] = False
+        faces = np.stack([node_key(space.conn[:, corners], space.n_nodes) for corners in space.face_corners], axis=1)
+        _, index, count = np.unique(faces[here], return_inverse=True, return_counts=True)
+        mask[here] = (count == 1)[index].reshape(faces[here].shape)
+        mask[gone] = False
+    for plane in planes:
+        on = np.zeros(space.n_nodes, bool)
+        on[plane] = True
+        for face, corners in enumerate(space.face_corners):
+            mask[:, face] &= ~on[space.conn[:, corners]].all(axis=1)
+    return mask
+
+
+def turning(space: Space, planes: Sequence[np.ndarray] = ()) -> tuple[float, np.ndarray]:
     """Greatest angle [degrees] by which the body's surface turns inwards at a node (2D) or an edge (3D), and its place.
 
     A round notch meshed by n elements turns by 180/n at a node, a square one by 90, a slit by 180; convex corners do
-    not count. The angle is that of the body around the node or edge, less 180 degrees.
+    not count. The angle is that of the body around the node or edge, less 180 degrees. At a plane of symmetry (`planes`
+    as in :func:`outer_faces`) it is that of the body with its image.
     """
-    nodes, angles = turnings(space)
+    nodes, angles = turnings(space, planes)
     worst = int(np.argmax(angles))
     return float(angles[worst]), space.X[nodes[worst]].mean(axis=0)
 
 
-def turnings(space: Space) -> tuple[np.ndarray, np.ndarray]:
+def turnings(space: Space, planes: Sequence[np.ndarray] = (), gone: np.ndarray | None = None
+             ) -> tuple[np.ndarray, np.ndarray]:
     """The node (m, 1), or the two nodes of an edge (m, 2), and the angle (m,) of :func:`turning` for each of them.
 
-    The angle is negative where the surface turns outwards, and -180 inside.
+    The angle is negative where the surface turns outwards, and -180 inside; `planes` and `gone` are those of
+    :func:`outer_faces`.
     """
     dim, conn = space.dim, space.conn
     corners = np.arange(2**dim)
-    outer = space.outer_faces                              # (ne, 2 dim): whether face 2 axis + side is on the surface
+    outer = outer_faces(space, planes, gone)               # (ne, 2 dim): whether face 2 axis + side is on the surface
+    here = np.ones(space.n_elements)
+    here[[] if gone is None else gone] = 0.0
     keys, angles, on_surface = [], [], []
     for along in range(dim) if dim == 3 else [-1]:
         i, j = (axis for axis in range(dim) if axis != along)
@@ -62,22 +92,25 @@ def turnings(space: Space) -> tuple[np.ndarray, np.ndarray]:
                 arms = [arm - np.einsum("ei,ei->e", arm, edge)[:, None] * edge for arm in arms]
             lengths = np.linalg.norm(arms[0], axis=1) * np.linalg.norm(arms[1], axis=1)
             cosine = np.einsum("ei,ei->e", *arms) / lengths
-            angles.append(np.arccos(np.clip(cosine, -1.0, 1.0)))
+            angles.append(here * np.arccos(np.clip(cosine, -1.0, 1.0)))
             keys.append(node_key(conn[:, ends], space.n_nodes))
             on_surface.append(outer[:, 2 * i + (a >> i & 1)] | outer[:, 2 * j + (a >> j & 1)])
     places, where = np.unique(np.concatenate(keys), return_inverse=True)
     around = np.bincount(where, np.concatenate(angles), len(places))
-    around[np.bincount(where, np.concatenate(on_surface), len(places)) == 0] = 0.0
     nodes = places[:, None] if dim == 2 else np.stack(np.divmod(places, space.n_nodes), axis=1)
+    for plane in planes:
+        around = np.where(np.isin(nodes, plane).all(axis=1), 2.0 * around, around)  # with its image
+    around[np.bincount(where, np.concatenate(on_surface), len(places)) == 0] = 0.0
     return nodes, np.degrees(around) - 180.0
 
 
-def corner_near(space: Space, element: int) -> Corner | None:
+def corner_near(space: Space, element: int, planes: Sequence[np.ndarray] = (), gone: np.ndarray | None = None
+                ) -> Corner | None:
     """Where the surface turns inwards the most: at the element, or else at those that share a node with it.
 
-    None where it does not, by a degree at least.
+    None where it does not, by a degree at least. `planes` and `gone` as in :func:`outer_faces`.
     """
-    nodes, angles = turnings(space)
+    nodes, angles = turnings(space, planes, gone)
     around = np.isin(space.conn, space.conn[element]).any(axis=1)
     for near in (space.conn[element], np.unique(space.conn[around])):
         here = np.flatnonzero(np.isin(nodes, near).all(axis=1) & (angles > 1.0))
@@ -88,16 +121,28 @@ def corner_near(space: Space, element: int) -> Corner | None:
     worst = int(here[np.argmax(angles[here])])
     corner = space.X[nodes[worst]]
     place, breadth = corner.mean(axis=0), 1.0 if space.dim == 2 else float(np.linalg.norm(corner[1] - corner[0]))
-    facets = space.mesh.boundary_facets()
-    members = space.mesh.facets[:, facets].T
+    owners, faces = np.nonzero(outer_faces(space, planes, gone))
+    members = np.take_along_axis(space.conn[owners], space.face_corners[faces], axis=1)
     beside = np.isin(members, nodes[worst]).sum(axis=1) == nodes.shape[1]
-    far = [space.X[np.setdiff1d(facet, nodes[worst])].mean(axis=0) for facet in members[beside]]
-    lengths = np.linalg.norm(np.array(far) - place, axis=1)
-    owners = space.mesh.f2t[0, facets[beside]]
+    owners, members = owners[beside], members[beside]
+    far = np.array([space.X[np.setdiff1d(facet, nodes[worst])].mean(axis=0) for facet in members]) - place
+    lengths = np.linalg.norm(far, axis=1)
     thickness = space.extent[owners] / (lengths * breadth)
-    into = (space.X[space.conn[owners]].mean(axis=1) - space.X[members[beside]].mean(axis=1)).sum(axis=0)
+    into = (space.X[space.conn[owners]].mean(axis=1) - space.X[members].mean(axis=1)).sum(axis=0)
+    for plane in planes:
+        if np.isin(nodes[worst], plane).all():
+            into = _within(space.X[plane], into)
+    if np.linalg.norm(into) < 1e-6 * lengths.mean():       # the lips of a slit face each other
+        into = -far.mean(axis=0)
     return Corner(float(angles[worst]), place, float(lengths.mean() / np.radians(angles[worst])),
                   float(thickness.mean()), into / np.linalg.norm(into))
+
+
+def _within(points: np.ndarray, vector: np.ndarray) -> np.ndarray:
+    """The part of a vector (dim,) in the plane, or on the line, of some points (k, dim)."""
+    normal = np.linalg.svd(np.cov(points.T))[0][:, -1]
+    part: np.ndarray = vector - (vector @ normal) * normal
+    return part
 
 
 def below(space: Space, corner: Corner, depth: float) -> np.ndarray:

@@ -14,12 +14,12 @@ leading tip  the tip farthest, in a straight line, from the middle of its origin
 tip speed    slope of the line fitted by least squares to the crack length over the last 4 l/c_s; 0 in passes.
 mean speed   crack length gained between its first passing l and the first arrival, over the time that took; none in
              passes.
-first arrival  a connected piece of the cracked set touches the rim of the sample at two places, more than 3 l apart:
-             the crack has reached an edge, a grip or another notch, or has met the crack that came from there. The
-             rim is the outer boundary, in three dimensions without the surfaces along which a crack runs; a place is
-             a set of cracked nodes of the rim joined by edges of elements along it. A plane of symmetry is no part of
-             the rim: there the body goes on as its image, and a piece that touches the plane has the images of its
-             places too.
+first arrival  a connected piece of the cracked set touches the rim of the sample at two places, more than 3 l apart,
+             or, in the plane, more than 10 l on the way along the rim, as through a thin wall: the crack has reached
+             an edge, a grip or another notch, or has met the crack that came from there. The rim is the outer
+             boundary, in three dimensions without the surfaces along which a crack runs; a place is a set of cracked
+             nodes of the rim joined by edges of elements along it. A plane of symmetry is no part of the rim: there
+             the body goes on as its image, and a piece that touches the plane has the images of its places too.
 separation   no path of uncracked nodes joins two grips.
 """
 
@@ -40,6 +40,7 @@ __all__ = ["CRACKED", "CrackTracker", "Plane", "Tips"]
 
 CRACKED = 0.1
 NODES = 8192     # whose distances to their neighbours are made at a time
+AROUND = 10.0   # lengths l along the rim of a plane body, from which on two places of it are not those of one notch
 ADVANCES = 10   # passes within which a tip that advances has cracked a node
 
 
@@ -152,9 +153,19 @@ class CrackTracker:
         for k in range(1, count):
             here = place == k
             rivals = (place < k) & (piece == piece[here][0])
-            if rivals.any() and cdist(X[here], X[rivals]).min() > 3 * self.l:
+            if rivals.any() and (cdist(X[here], X[rivals]).min() > 3 * self.l or self._around(rim[here], rim[rivals])):
                 return True
         return any(self._meets_its_image(plane, rim, place, piece, nodes, label) for plane in self._planes)
+
+    def _around(self, one: np.ndarray, other: np.ndarray) -> bool:
+        """Whether the way along the rim of a plane body from nodes to others is longer than :data:`AROUND` l."""
+        if self.space.dim == 3:
+            return False
+        along = self._graph[self._rim][:, self._rim]
+        place = np.full(self.space.n_nodes, -1)
+        place[self._rim] = np.arange(self._rim.size)
+        way = dijkstra(along, directed=False, indices=place[one], min_only=True, limit=AROUND * self.l)
+        return bool(np.isinf(way[place[other]]).all())
 
     def _meets_its_image(self, plane: Plane, rim: np.ndarray, place: np.ndarray, piece: np.ndarray, nodes: np.ndarray,
                          label: np.ndarray) -> bool:

@@ -8,7 +8,7 @@ field gamma, not to a material, and are those of the whole body.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
@@ -99,9 +99,10 @@ class RegionLaw:
     Parameters
     ----------
     name: of the set of elements in the mesh.
-    material: name of the law.
-    constants: of the law, as text ("mu = 2 MPa", or "E = 3 MPa, nu = 0.499"); those left out have their defaults.
-    phi: energy limiter Phi [MPa], > 0; 0 takes the one that belongs to the law.
+    material: name of the law; empty takes the law of the body with its constants and its energy limiter.
+    constants: of a law that is named, as text ("mu = 2 MPa", or "E = 3 MPa, nu = 0.499"); those left out have their
+        defaults.
+    phi: energy limiter Phi [MPa], > 0; 0 takes the one that belongs to the law, or that of the body with its law.
     m: sharpness of the limiter, >= 1; 0 takes that of the body.
     bulk_modulus: bulk modulus k [MPa], > 0; 0 takes that of the body.
     density: density rho0 [kg/m^3], > 0; 0 takes that of the body.
@@ -109,7 +110,7 @@ class RegionLaw:
     """
 
     name: str
-    material: str = "aaa"
+    material: str = ""
     constants: str = ""
     phi: Annotated[float, Unit("MPa")] = 0.0
     m: float = 0.0
@@ -120,6 +121,12 @@ class RegionLaw:
     def laws(self, material: Material, sink_law: SinkLaw) -> tuple[Material, SinkLaw]:
         """Material and sink law of the region, in a body of these."""
         try:
+            if not self.material:
+                if self.constants:
+                    raise ParameterError(f"constants {self.constants!r} are those of no law: give a material as well")
+                given = {"bulk_modulus": self.bulk_modulus, "density": self.density, "viscosity": self.viscosity}
+                law = replace(material, **{name: value for name, value in given.items() if value})
+                return law, replace(sink_law, phi=self.phi or sink_law.phi, m=self.m or sink_law.m)
             if self.bulk_modulus:
                 one_bulk_modulus(own_constants(self.material, self.constants)[1], self.bulk_modulus)
             law = material_of(self.material, self.constants, self.bulk_modulus or material.bulk_modulus,

@@ -22,6 +22,7 @@ from ..scene.scene import Scene
 from ..system.files import path_of
 from .fibre_picture import fibre_picture
 from .field_picture import field_picture
+from .line_curves import line_picture
 from .looks import cells_of
 from .moving import animation, few
 from .piece_picture import piece_picture
@@ -36,9 +37,9 @@ FORMATS = (".pdf", ".svg", ".png")  # of pictures that are drawn again
 
 
 def draw_run(scene: Scene, folder: Path, series: str, moments: Mapping[str, int]) -> None:
-    """`density`, `speed` (dynamic), `loading`, `energies`, `tip` and `animation.gif` of a run; `probes` of one with
-    probes, `fibres` of one with fibres, `fragments` of a body that has come apart, and the fields that its scene asks
-    for.
+    """`density`, `speed` (dynamic), `loading`, `energies`, `tip` and `animation.gif` of a run; `probes` and `lines` of
+    one with probes, `fibres` of one with fibres, `fragments` of a body that has come apart, and the fields that its
+    scene asks for.
 
     They are drawn from the files in `folder`, in the format that the scene says. `series` names the one to draw, "run",
     or "loading" of a body that did not fail; `moments` has the numbers of the frames at key moments.
@@ -145,9 +146,10 @@ def _draw_loading(run: _Files) -> None:
 
 
 def _draw_probes(run: _Files) -> None:
-    """`probes`, of a run that has probes."""
+    """`probes` and `lines`, of a run that has probes."""
     if probes := read_probes(run.folder):
         probe_picture(probes, run.path("probes"), run.title, run.scene.controls.analysis == "quasistatic")
+        line_picture(probes, run.path("lines"), run.title)
 
 
 def _draw_pieces(run: _Files, frame: Frame) -> None:

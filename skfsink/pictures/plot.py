@@ -24,6 +24,8 @@ from ..fem.space import Space
 from ..fields.energy import OPTIONAL_TERMS
 from ..results.frame import Frame
 from ..results.history import Table, history_units
+from ..results.loading import has_pressure, pressure_alone
+from ..results.tables import MMHG
 from ..system.files import replaced
 from . import body as deformed
 from .body import OBLIQUE, Body, View
@@ -161,31 +163,45 @@ def _dimension(history: History) -> int:
 
 
 @matplotlib.rc_context(STYLE)
-def loading_picture(history: History, path: str | Path, title: str = "", event: History | None = None) -> None:
-    """Load over displacement while the body is loaded, from the unloaded body on, and the least relative density.
+def loading_picture(history: Table, path: str | Path, title: str = "", event: Table | None = None) -> None:
+    """The loading, from the unloaded body on, over the least relative density: load over displacement, and of a body
+    under pressure the pressure over the volume that its boundary has swept; both where grips move as well.
 
     `event` has the rows of the event that the loading has ended in: the onset is marked then, and the way of the load
     from there on is drawn as well.
     """
-    rows = history["phase"] == "loading"
-    x, load, gamma = (history[name][rows] for name in ("grip_displacement_mm", "reaction_N_per_mm", "gamma_min"))
-    figure = Figure((WIDTH / 2 + 0.6, 4.2), layout="constrained")
-    ax, low = figure.subplots(2, 1, sharex=True, height_ratios=[3, 1])
-    unit = history_units(_dimension(history))["reaction_N_per_mm"]
-    if event is not None:
-        ax.plot(event["grip_displacement_mm"], event["reaction_N_per_mm"], color="0.55", linewidth=0.8, label="event")
-    ax.plot(np.append(0, x), np.append(0, load), "k.-", markersize=3, label="loading")
-    if event is not None and len(x):
-        ax.plot(x[-1], load[-1], "o", color=RED, markersize=5, zorder=3,
-                label=f"onset: {load[-1]:.3g} {unit} at {x[-1]:.3g} mm")
-        ax.legend(*(entry[::-1] for entry in ax.get_legend_handles_labels()), loc="best")
-    ax.set_ylabel(f"load ({unit})")
-    low.plot(np.append(0, x), np.append(1, gamma), color=RED)
-    least = float(gamma.min()) if len(gamma) else 1.0
-    low.set(xlabel="displacement (mm)", ylabel=r"least $\gamma$", ylim=(min(0.95, 1.1 * least - 0.1), None))
-    for limit, data in ((ax.set_xlim, ax.dataLim.intervalx), (ax.set_ylim, ax.dataLim.intervaly)):
-        if data[0] >= 0.0:  # nothing moved back: the corner is the unloaded body
-            limit(0, None)
+    rows = Table({name: values[history["phase"] == "loading"] for name, values in history.items()}, history.dim,
+                 history.without)
+    units = history_units(_dimension(history))
+    curves = []
+    if not pressure_alone(rows):
+        curves.append(("grip_displacement_mm", "reaction_N_per_mm", 1.0, "displacement (mm)", "load",
+                       units["reaction_N_per_mm"]))
+    if has_pressure(rows):
+        volume = units["swept_volume"].replace("^", "$^") + "$"
+        what = "swept area" if _dimension(history) == 2 else "swept volume"
+        curves.append(("swept_volume", "pressure_MPa", 1e3, f"{what} ({volume})", "pressure", "kPa"))
+    figure = Figure((WIDTH if len(curves) > 1 else WIDTH / 2 + 0.6, 4.2), layout="constrained")
+    axes = figure.subplots(2, len(curves), sharex="col", height_ratios=[3, 1], squeeze=False)
+    for (across, up, factor, xlabel, ylabel, unit), (ax, low) in zip(curves, axes.T):
+        x, y, gamma = rows[across], factor * rows[up], rows["gamma_min"]
+        if event is not None:
+            ax.plot(event[across], factor * event[up], color="0.55", linewidth=0.8, label="event")
+        ax.plot(np.append(0, x), np.append(0, y), "k.-", markersize=3, label="loading")
+        if event is not None and len(x):
+            ax.plot(x[-1], y[-1], "o", color=RED, markersize=5, zorder=3,
+                    label=f"onset: {y[-1]:.3g} {unit} at {x[-1]:.3g} {xlabel.partition('(')[2][:-1]}")
+            ax.legend(*(entry[::-1] for entry in ax.get_legend_handles_labels()), loc="best")
+        ax.set_ylabel(f"{ylabel} ({unit})")
+        low.plot(np.append(0, x), np.append(1, gamma), color=RED)
+        least = float(gamma.min()) if len(gamma) else 1.0
+        low.set(xlabel=xlabel, ylabel=r"least $\gamma$", ylim=(min(0.95, 1.1 * least - 0.1), None))
+        for limit, data in ((ax.set_xlim, ax.dataLim.intervalx), (ax.set_ylim, ax.dataLim.intervaly)):
+            if data[0] >= 0.0:  # nothing moved back: the corner is the unloaded body
+                limit(0, None)
+        if unit == "kPa":
+            beside = ax.secondary_yaxis("right", functions=(lambda p: p * MMHG / 1e3, lambda p: p * 1e3 / MMHG))
+            beside.set_ylabel("mmHg")
     figure.align_ylabels()
     save(figure, path, title)
 

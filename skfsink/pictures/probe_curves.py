@@ -13,11 +13,11 @@ from matplotlib.figure import Figure
 from ..results.probes import ENDINGS, FIRST, ProbeTable
 from .plot import STYLE, WIDTH, save
 
-__all__ = ["probe_picture"]
+__all__ = ["COLOURS", "MOST", "RAISED", "by_unit", "legend", "probe_picture"]
 
 RAISED = {ord("^"): None, ord("2"): "²", ord("3"): "³"}
 MOST = 12     # panels, one below the other
-_COLOURS = ("k", "#33658a", "#a63d40", "#c98a2b", "#5b8e7d", "#7b4ea3")
+COLOURS = ("k", "#33658a", "#a63d40", "#c98a2b", "#5b8e7d", "#7b4ea3")
 
 
 @matplotlib.rc_context(STYLE)
@@ -25,11 +25,11 @@ def probe_picture(probes: Mapping[str, ProbeTable], path: str | Path, title: str
                   quasistatic: bool = False) -> None:
     """Curves of probes, of the loading over the displacement (left) and of the event over time (right).
 
-    A panel for the columns of one unit of a probe; lines are left out, and what would be too much. Nothing is drawn
-    where nothing is left.
+    A panel for the columns of one unit of a probe; lines have a picture of their own, and what would be too much is
+    left out. Nothing is drawn where nothing is left.
     """
     panels = [(name, table, unit, columns) for name, table in probes.items() if "s_mm" not in table
-              for unit, columns in _by_unit(table).items()][:MOST]
+              for unit, columns in by_unit(table).items()][:MOST]
     if not panels:
         return
     figure = Figure((WIDTH, 0.8 + 1.3 * len(panels)), layout="constrained")
@@ -37,19 +37,19 @@ def probe_picture(probes: Mapping[str, ProbeTable], path: str | Path, title: str
     for (left, right), (name, table, unit, columns) in zip(axes, panels):
         loading = table["phase"] == "loading"
         time = table["step"].astype(float) if quasistatic else 1e6 * table["time_s"]
-        for column, colour in zip(columns, _COLOURS):
+        for column, colour in zip(columns, COLOURS):
             label = column.removesuffix(ENDINGS.get(unit, ""))
             left.plot(table["grip_displacement_mm"][loading], table[column][loading], ".-", color=colour, markersize=3)
             right.plot(time[~loading], table[column][~loading], color=colour, label=label)
         left.set_ylabel(name + ("" if unit == "1" else f" ({unit.translate(RAISED)})"))
-        _legend(right)
+        legend(right)
     axes[-1][0].set_xlabel("loading: displacement (mm)")
     axes[-1][1].set_xlabel("event: pass" if quasistatic else "event: time (µs)")
     figure.align_ylabels()
     save(figure, path, title)
 
 
-def _by_unit(table: ProbeTable) -> dict[str, list[str]]:
+def by_unit(table: ProbeTable) -> dict[str, list[str]]:
     """Columns of a probe by their units."""
     found: dict[str, list[str]] = {}
     for name, values in table.items():
@@ -58,5 +58,6 @@ def _by_unit(table: ProbeTable) -> dict[str, list[str]]:
     return found
 
 
-def _legend(ax: Axes) -> None:
+def legend(ax: Axes) -> None:
+    """The legend of a panel, beside it."""
     ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from ..pictures.plot import STYLE
 from ..results.loader import Run
-from ..results.loading import way_to_onset
+from ..results.loading import pressure_alone, way_to_onset
 
 __all__ = ["COLOURS", "Chart", "energy_chart", "loading_chart", "speed_chart"]
 
@@ -106,8 +106,13 @@ def energy_chart(runs: Sequence[Run], labels: Sequence[str]) -> Chart | None:
 
 @matplotlib.rc_context(_SVG)
 def loading_chart(runs: Sequence[Run], labels: Sequence[str]) -> Chart | None:
-    """Load over the displacement of the grips up to the onset, a dot; None if no run was loaded in more than one step.
+    """Load over the displacement of the grips up to the onset, a dot, or of bodies under pressure alone the pressure
+    over the swept volume; None if no run was loaded in more than one step.
     """
+    pressed = bool(runs) and all(pressure_alone(way_to_onset(run.folder)) for run in runs)
+    across, up, factor = (("swept_volume", "pressure_MPa", 1e3) if pressed else
+                          ("grip_displacement_mm", "reaction_N_per_mm", 1.0))
+    what = "Pressure over swept volume" if pressed else "Load over displacement"
     figure = Figure((_SIZE[0], 2.6), layout="constrained")
     ax = figure.subplots()
     sentences = []
@@ -115,19 +120,20 @@ def loading_chart(runs: Sequence[Run], labels: Sequence[str]) -> Chart | None:
         rows = way_to_onset(run.folder)
         if len(rows["step"]) < 2:
             continue
-        x, y = (rows[name] for name in ("grip_displacement_mm", "reaction_N_per_mm"))
-        unit = run.history.units["reaction_N_per_mm"]
+        x, y = rows[across], factor * rows[up]
+        unit = "kPa" if pressed else run.history.units[up]
         ax.plot(np.append(0, x), np.append(0, y), marker=".", **look)
         if run.event["step"].size:
             ax.plot(x[-1:], y[-1:], "o", markersize=5, color=look["color"], zorder=3)  # the onset
-        sentences.append(f"{label}: {y[-1]:.3g} {unit} at {x[-1]:.3g} mm")
+        sentences.append(f"{label}: {y[-1]:.3g} {unit} at {x[-1]:.3g} {run.history.units[across]}")
     if not sentences:
         return None
-    ax.set(ylabel=f"load ({_unit(runs, 'reaction_N_per_mm')})", xlabel="displacement of the grips (mm)",
+    ax.set(ylabel="pressure (kPa)" if pressed else f"load ({_unit(runs, up)})",
+           xlabel=f"swept volume ({_unit(runs, across)})" if pressed else "displacement of the grips (mm)",
            xlim=(0, None), ylim=(0, None))
     if len(runs) > 1:
         figure.legend(loc="outside upper left", ncols=3)
-    return Chart(_svg(figure), "Load over displacement up to the onset. " + "; ".join(sentences) + ".")
+    return Chart(_svg(figure), f"{what} up to the onset. " + "; ".join(sentences) + ".")
 
 
 def _svg(figure: Figure) -> bytes:

@@ -14,7 +14,7 @@ from markupsafe import Markup
 from ..errors import OutputError
 from ..results.loader import Run, load
 from ..results.tables import EMPTY, Row, Table, cost_table, energy_tables, key_table, version_table
-from ..system.files import reported, write_atomic
+from ..system.files import path_of, reported, write_atomic
 from ..system.version import __version__
 from . import charts
 from .citation import bibtex, citations
@@ -36,11 +36,12 @@ FIELDS = (
 PICTURES = (
     ("density.png", "Relative density", "Relative density γ on the deformed body at the key moments"),
     ("speed.png", "Speed of the material", "Speed of the material on the deformed body at the key moments"),
-    ("loading.png", "Loading", "Load over displacement while the body was loaded, and the least relative density"),
+    ("loading.png", "Loading", "Load over displacement, or pressure over volume, of the loading, and least density"),
     ("energies.png", "Energy ledger", "Where the energy of the event is over time, stacked, and what does not add up"),
     ("tip.png", "Tip of the crack", "Length of the crack, position and speed of its leading tip, and branches"),
     ("release.png", "Energy release rate", "Energy release rate and speed of each tip over time"),
     ("fragments.png", "Pieces", "The deformed body at the end, coloured by the pieces into which it has come apart"),
+    ("lines.png", "Lines", "What probes on lines show as the loading ends (full) and as the event does (dashed)"),
     ("probes.png", "Probes", "What the probes followed: in the loading over displacement, in the event over time"),
     *FIELDS,
     ("animation.gif", "Animation", "Relative density γ on the deformed body, moving"),
@@ -76,7 +77,7 @@ class Part:
     verdict: str
 
 
-def write_report(folders: Sequence[Path], out: Path | None = None) -> Path:
+def write_report(folders: Sequence[str | Path], out: str | Path | None = None) -> Path:
     """Write the report of one run, or of several compared, and return its path.
 
     Parameters
@@ -89,12 +90,15 @@ def write_report(folders: Sequence[Path], out: Path | None = None) -> Path:
     OutputError
         No folder, one without a run or without any event, or the file cannot be written.
     """
+    if isinstance(folders, str | Path):
+        raise OutputError(f"folders must be a list of them; got {str(folders)!r}: write [{str(folders)!r}]")
     if not folders:
         raise OutputError("name at least one folder of a run")
-    out = out or (folders[0] / "report.html" if len(folders) == 1 else Path("comparison.html"))
+    runs = [path_of("folder", folder) for folder in folders]
+    out = path_of("out", out) if out else (runs[0] / "report.html" if len(runs) == 1 else Path("comparison.html"))
     if out.is_dir():
         raise OutputError(f"the report cannot be written to {out}: that is a folder; name a file with --out")
-    write_atomic(out, report_page([load(folder) for folder in folders]))
+    write_atomic(out, report_page([load(folder) for folder in runs]))
     return out
 
 

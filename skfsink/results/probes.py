@@ -71,7 +71,15 @@ class ProbeTable(dict[str, np.ndarray]):
         self.points = 1 if "s_mm" not in self else int(back[0]) + 1 if back.size else max(1, s.size)
 
     def look(self, name: str) -> np.ndarray:
-        """A column with a row for each look, (looks, points); of what is not a line (looks, 1)."""
+        """A column with a row for each look, (looks, points); of what is not a line (looks, 1).
+
+        Raises
+        ------
+        OutputError
+            There is no such column.
+        """
+        if name not in self:
+            raise OutputError(f"the probe has no column {name!r}; it has {', '.join(self)}")
         return self[name].reshape(-1, self.points)
 
 

@@ -20,6 +20,7 @@ __all__ = ["EMPTY", "Row", "Table", "cost_table", "energy_tables", "key_table", 
            "version_table"]
 
 EMPTY = "–"
+MMHG = 7500.6157584566  # mmHg in a MPa
 
 
 @dataclass(frozen=True)
@@ -137,6 +138,9 @@ def key_table(runs: Sequence[Run], labels: Sequence[str], waves: Sequence[tuple[
         row("nominal strength by theory, incompressible", "MPa", "material_point", "nominal_strength_theory_MPa"),
         row("displacement of the grips at the onset", "mm", "onset", "displacement_mm"),
         row_of("load at the onset", force, [onset_load(_get(run, "onset") or {}) for run in runs]),
+        row("pressure at the onset", "kPa", "onset", "pressure_MPa", factor=1e3),
+        row("pressure at the onset", "mmHg", "onset", "pressure_MPa", factor=MMHG),
+        row("greatest pressure while it was loaded", "kPa", "loading", "greatest_pressure_MPa", factor=1e3),
         row("elastic energy at the onset", energy, "onset", "elastic_energy"),
         row_of("where it begins to fail", "", [_beginning(run) for run in runs]),
         row("first arrival of the crack at an edge", "µs", "event", "first_arrival_s", factor=1e6),

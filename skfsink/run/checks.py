@@ -147,7 +147,10 @@ def refuse(scene: Scene) -> None:
                              f"direction of the one that moves{', or merge nodes that coincide' if count > 1 else ''}")
 
 
-def check_size(space: Space, length_scale: float, *, of_metres: str = "multiply those of a mesh in m by 1000",
+METRES = "multiply those of a mesh in m by 1000 (skfsink mesh IN OUT --from m)"
+
+
+def check_size(space: Space, length_scale: float, *, of_metres: str = METRES,
                of_micrometres: str = "divide those of a mesh in µm by 1000") -> None:
     """Refuse a body smaller than the length l [mm] of the sink, and elements of many l (ParameterError).
 

@@ -34,6 +34,7 @@ def summarize(scene: Scene, simulation: Simulation) -> dict[str, Any]:
     ledger, onset, tracker = state.ledger, simulation.onset.figures, crack.tracker
     space, cost = scene.sample.space, simulation.cost()
     dynamic = scene.controls.analysis == "dynamic"
+    pressed = simulation.momentum.followers is not None
     without = terms_without(simulation.momentum, dynamic)
     units = history_units(space.volume_dim)
     balances = [abs(row["balance"]) for row in simulation.history.rows if row["phase"] != "loading"]
@@ -49,10 +50,12 @@ def summarize(scene: Scene, simulation: Simulation) -> dict[str, Any]:
         "units": {"load": units["reaction_N_per_mm"], "energy": units["elastic"]},
         "loading": {"greatest_load": greatest.get("load"),
                     "displacement_at_greatest_load_mm": greatest.get("displacement_mm"),
+                    **({"greatest_pressure_MPa": greatest.get("pressure_MPa")} if pressed else {}),
                     "greatest_W_over_phi": ratio, "place_of_greatest_W_over_phi_mm": place},
         "material_point": _material_point(scene, simulation),
         "onset": {"displacement_mm": onset.get("displacement_mm"),
                   load_name(space.volume_dim): onset.get("reaction_N_per_mm"),
+                  **({"pressure_MPa": onset.get("pressure_MPa")} if pressed else {}),
                   **{k: onset.get(k) for k in ("elastic_energy", "gamma_min", "place_mm", "boundary")},
                   "notch": simulation.guard.notch or None},
         "event": {"first_arrival_s": tracker.arrival if dynamic else None,
@@ -70,8 +73,7 @@ def summarize(scene: Scene, simulation: Simulation) -> dict[str, Any]:
                    "external_work": onset.get("work", 0.0) + ledger.work, "deletion": ledger.deletion,
                    "numerical": ledger.numerical, "released": ledger.released,
                    **{name: getattr(ledger, name) for name in OPTIONAL_TERMS if name not in without},
-                   **({} if simulation.momentum.followers is None else
-                      {"pressure_work": onset.get("pressure_work", 0.0) + ledger.pressure_work}),
+                   **({"pressure_work": onset.get("pressure_work", 0.0) + ledger.pressure_work} if pressed else {}),
                    "balance_error_relative": max(balances, default=0.0) / ledger.scale(onset["elastic_energy"])
                    if onset else None},
         **({"cracks": crack_summary(scene, body)} if scene.cracks else {}),

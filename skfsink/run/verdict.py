@@ -47,7 +47,7 @@ def verdict(scene: Scene, simulation: Simulation) -> str:
     if quasistatic and simulation.statics.arrested:
         return f"arrested at {tip}{arrived}: {simulation.statics.arrested}"
     if simulation.history.rows[-1]["tips"]:
-        return f"the crack was still running at event_time = {event:g} s: its tip is at {tip}"
+        return f"the crack was still running at event_time = {event:g} s{arrived and ','}{arrived}: its tip is at {tip}"
     return f"arrested at {tip}{arrived}: no tip has moved for 5 l/c_s at the end of the event"
 
 

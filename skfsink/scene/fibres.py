@@ -1,7 +1,7 @@
 """The directions of fibres in a body, from the tables [[fibres]] of a deck.
 
     [[fibres]]
-    region = "media"              # left out: what is in no region
+    region = "media"              # left out: what is in no region, and regions of the same law
     direction = "circumferential" # around the line through `centre` along `axis`; or "axial", along it; or [1, 1, 0]
     centre = ["0 mm", "0 mm"]
     normal = [0, 0, 1]            # of the plane of the fibres; left out: the radius, what rises, or that of the law
@@ -37,13 +37,20 @@ def with_fibres(tables: Any, sample: Sample, material: Material, regions: Sequen
                 ) -> tuple[Material, tuple[Region, ...]]:
     """The material of a body and its regions, with the directions of the tables.
 
+    Those of the body are also those of regions of the same law, as of one that differs in its strength alone.
+
     Raises
     ------
     ParameterError
-        A region is not there, has no fibres or gets them twice; directions are missing, or there are none somewhere.
+        A region is not there, has no fibres or gets them twice; directions are missing, or there are none somewhere;
+        the deck directs the fibres of some parts of the body, and nothing those of another.
     """
     found, seen = {region.name: region for region in regions}, set[str]()
-    for table in read_tables("fibres", tables):
+    given = {table.get("region", ""): table for table in read_tables("fibres", tables)}
+    alike = [name for name, region in found.items()
+             if "" in given and name not in given and region.material == material]
+    rest = rest_of(list(found.values()), sample.space.n_elements)
+    for table in (*read_tables("fibres", tables), *({**given[""], "region": name} for name in alike)):
         name = table.get("region", "")
         if name in seen:
             raise ParameterError(f"fibres {_of(name)} are there twice: leave one out")
@@ -51,13 +58,25 @@ def with_fibres(tables: Any, sample: Sample, material: Material, regions: Sequen
         if name and name not in found:
             raise ParameterError(f"fibres: {name} is no region of the deck, which has "
                                  f"{', '.join(found) or 'none: leave region out'}")
-        elements = found[name].elements if name else rest_of(list(found.values()), sample.space.n_elements)
+        elements = found[name].elements if name else rest
         law = _directed(table, name, sample, found[name].material if name else material, elements, axisymmetric)
         if name:
             found[name] = replace(found[name], material=law)
         else:
             material = law
+    if seen:
+        for name, law in (*((("", material),) if rest.size else ()), *((r.name, r.material) for r in found.values())):
+            if name not in seen and _undirected(law):
+                raise ParameterError(f"fibres {_of(name)} have no direction, and would lie along x while others of the "
+                                     f"deck have one: add a table [[fibres]]" + (f" with region = {name!r}" if name else
+                                     " without a region") + ", or an axis in the constants")
     return material, tuple(found.values())
+
+
+def _undirected(law: Material) -> bool:
+    """Whether nobody has said where the fibres of a law lie."""
+    default = HolzapfelGasserOgden()
+    return isinstance(law, HolzapfelGasserOgden) and (law.axis, law.normal) == (default.axis, default.normal)
 
 
 def _of(name: str) -> str:

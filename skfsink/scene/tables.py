@@ -163,6 +163,11 @@ def _one_direction(table: Mapping[str, Any]) -> None:
 def _with_constants(table: Mapping[str, Any]) -> dict[str, Any]:
     """The table of a region, with the constants that E, G and nu stand for."""
     law = RegionLaw(**table)
+    if not law.material:
+        if law.constants:
+            raise ParameterError(f"region {law.name}: constants {law.constants!r} are those of no law: give a material "
+                                 f"as well")
+        return _table(law)
     if law.material not in MATERIALS:
         raise ParameterError(f"region {law.name}: material must be one of {', '.join(MATERIALS)}; got {law.material!r}")
     try:
@@ -194,7 +199,7 @@ def _table(item: Any) -> Any:
     if isinstance(item, Filling):
         return {"boundary": item.boundary, "inflow": plain(item.inflow), "compliance": plain(item.compliance)}
     if isinstance(item, RegionLaw):
-        return {name: value for name, value in asdict(item).items() if value or name in ("name", "material")}
+        return {name: value for name, value in asdict(item).items() if value or name == "name"}
     return item
 
 

@@ -17,7 +17,8 @@ from ..system.files import replaced
 __all__ = ["DRAWN", "draw"]
 
 #: figures that have a panel, as far as a run has them
-DRAWN = ("onset_load", "onset_displacement", "onset_G", "U", "D", "tip_speed", "branches", "tear_angle")
+DRAWN = ("onset_pressure", "onset_load", "onset_displacement", "onset_G", "U", "D", "tip_speed", "branches",
+         "tear_angle")
 SERIES = 10  # at the most that have a colour of their own
 _STYLE: dict[Any, Any] = {"font.family": "DejaVu Sans", "font.size": 10}
 

@@ -24,6 +24,7 @@ FIGURES: tuple[tuple[str, str, tuple[str | int, ...]], ...] = (
     ("onset_displacement", "mm", ("onset", "displacement_mm")),
     ("onset_load", "load", ("onset",)),
     ("greatest_load", "load", ("loading", "greatest_load")),
+    ("onset_pressure", "MPa", ("onset", "pressure_MPa")),
     ("onset_boundary", "", ("onset", "boundary")),
     ("onset_x", "mm", ("onset", "place_mm", 0)),
     ("onset_y", "mm", ("onset", "place_mm", 1)),
@@ -56,6 +57,7 @@ def read_rows(folders: Sequence[Path], varied: Sequence[Mapping[str, Any]]) -> l
             row["onset_load"] = onset_load(row["onset_load"] or {})
             row["failure"] = failure.read_text().strip() if failure.is_file() else None if part else "not finished"
             row["verdict"] = part.get("verdict")
+            row["warnings"] = len(part["warnings"]) if "warnings" in part else None
             row["folder"] = folder.name
             rows.append(row)
     return rows

@@ -59,8 +59,8 @@ def varied(name: str, deck: Deck) -> Varied:
     head, dot, tail = name.rpartition(".")
     regions: Sequence[Any] = deck.parameters.get("regions", ())
     if dot and (found := [i for i, table in enumerate(regions) if table["name"] == head]):
-        own = str(regions[found[0]].get("material", "aaa"))
-        if tail in own_names(own):
+        own = str(regions[found[0]].get("material", ""))
+        if own and tail in own_names(own):
             return _constant_of_region(name, found[0], own, tail)
         return _of_table(name, "regions", found[0], tail)
     cracks: Sequence[Any] = deck.parameters.get("cracks", ())

@@ -19,7 +19,8 @@ from ...fields.state import State
 from ...material.regions import by_element
 from .observer import Observer
 from .overlap import overlap
-from .range import COARSE, check_onset
+from .places import symmetry_planes
+from .range import COARSE, check_onset, check_volume
 from .tip import check_tip
 from .view import View
 
@@ -84,6 +85,7 @@ class Guard(Observer):
 
     def unfailed(self, view: View) -> None:
         """Look at the last state of a body that did not fail."""
+        check_volume(self.scene, view.state)
         self._check_stress(view)
         self.check_end()
 
@@ -145,7 +147,8 @@ class Guard(Observer):
         if fails:
             self.evenness = self._even_share(loaded)
             check_onset(self.scene, begun)
-            self.notch = check_tip(self.space, int(np.argmax(loaded)), loaded)
+            planes = [plane.nodes for _, plane in symmetry_planes(self.scene)]
+            self.notch = check_tip(self.space, int(np.argmax(loaded)), loaded, planes, self.scene.cracks)
         error, allowed = state.ledger.error(state.ledger.elastic), self.scene.controls.balance_tolerance
         if not error <= allowed:
             raise InstabilityError(f"the ledger of the loading is open by {error:.2%} of the stored energy, allowed "

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ..material_point import mean_deformation, mean_stress
+from .history import VALUES
 from .observer import Observer
 from .places import beginning, check_beginning, greatest_ratio
 from .view import View
@@ -20,7 +21,7 @@ class Strength(Observer):
     Attributes
     ----------
     greatest: load, displacement, mean deformation gradient F and nominal stress P [MPa] where the load was greatest in
-        amount; empty before.
+        amount; with a pressure also the greatest one, in amount, `pressure_MPa`. Empty before.
     """
 
     kept = ("greatest",)
@@ -32,9 +33,17 @@ class Strength(Observer):
         """Pushed or pulled, whichever was more."""
         load, momentum = view.load, view.body.momentum
         if abs(load) > abs(self.greatest.get("load", 0.0)):
-            self.greatest = {"load": load, "displacement_mm": view.displacement,
+            self.greatest = {**self.greatest, "load": load, "displacement_mm": view.displacement,
                              "F": mean_deformation(momentum, view.state.u).tolist(),
                              "P": mean_stress(momentum.space, view.reaction).tolist()}
+        pressure = _pressure(view)
+        if abs(pressure.get("pressure_MPa", 0.0)) > abs(self.greatest.get("pressure_MPa", 0.0)):
+            self.greatest.update(pressure)
+
+
+def _pressure(view: View) -> dict[str, float]:
+    """The first pressure, or that in the first filling; empty without one."""
+    return {"pressure_MPa": VALUES["pressure_MPa"](view)} if view.body.loading.followers is not None else {}
 
 
 class Onset(Observer):
@@ -52,7 +61,7 @@ class Onset(Observer):
         """Note the onset."""
         state, ledger = view.body.since_begun(view.state), view.state.ledger
         ratio, place = greatest_ratio(view.body.density, state)
-        self.figures = {"displacement_mm": view.displacement, "reaction_N_per_mm": view.load,
+        self.figures = {"displacement_mm": view.displacement, "reaction_N_per_mm": view.load, **_pressure(view),
                         "elastic_energy": ledger.elastic, "gamma_min": float(state.gamma.min()), "sink": ledger.sink,
                         "work": ledger.work, "pressure_work": ledger.pressure_work,
                         "loading_balance": ledger.balance, **({} if view.on_time else beginning(view.scene, state)),

@@ -20,6 +20,7 @@ from ...fields.density import DensitySolver
 from ...fields.state import State
 from ...loads.grips import Grip, Ramp, Sliding
 from ...loads.sliding import normal_of
+from ...results.tables import MMHG
 from ...scene.scene import Scene
 
 __all__ = ["beginning", "check_arrival", "check_beginning", "greatest_ratio", "onset_text", "rim_of", "symmetry_planes"]
@@ -139,7 +140,9 @@ def onset_text(onset: dict[str, Any]) -> str:
     x, boundary = place_text(onset["place_mm"]), onset["boundary"]
     where = {"everywhere": "everywhere at once, most", "inside": "inside,", "surface": "at its surface,"}.get(
         boundary, f"at {boundary},")
-    return f"the body begins to fail {where} at {x} mm"
+    p = onset.get("pressure_MPa")
+    under = "" if p is None else f", under {1e3 * p:.4g} kPa ({p * MMHG:.4g} mmHg)"
+    return f"the body begins to fail {where} at {x} mm{under}"
 
 
 def check_beginning(scene: Scene, state: State) -> None:

@@ -16,8 +16,9 @@ from ...fem.space import Space
 from ...fields.state import State
 from ...material.regions import Region
 from ...scene.scene import Scene
+from .places import symmetry_planes
 
-__all__ = ["COARSE", "SHARP", "check_onset", "check_pressure", "check_scene"]
+__all__ = ["COARSE", "SHARP", "check_onset", "check_pressure", "check_scene", "check_volume"]
 
 log = logging.getLogger(__name__)
 
@@ -27,6 +28,8 @@ COARSE = 1.2           # l/h below which the mesh decides where and when it crac
 NARROW = 0.1           # width of an element, of the median one, below which it governs the explicit step
 SHARP = 60.0           # degrees by which a notch may turn at one node
 CHECKERED = 0.1        # amplitude of an alternating pressure, of mu
+FIRM = 3e3             # k/Phi with which a body that fails has changed its volume by less than half a per cent
+SWELLING = 0.01        # mean change of volume, of a body that is to be nearly incompressible
 
 
 def check_scene(scene: Scene) -> None:
@@ -39,14 +42,17 @@ def check_scene(scene: Scene) -> None:
         log.warning("the plain element locks at k/mu = %.4g (above %g)%s: stiffness, onset load and U come out too "
                     "high; take element = 'jbar'", ratio, LOCKS, _where(scene, part))
     if ratio > STIFF and scene.controls.element != "planestress":
+        enough = max(1e3 * part.material.shear_modulus, FIRM * part.sink_law.phi)
+        cure = (f"with bulk_modulus {enough:.3g} the solid is as good as incompressible"
+                if enough < 0.5 * part.material.bulk_modulus else
+                "its strength phi asks for a bulk_modulus as large: look at the balance error, or take 'hht'")
         log.warning("k/mu = %.3g%s is so large (above %g) that rounding comes near the tolerance of equilibria, "
-                    "and the explicit step falls with its root; with bulk_modulus %.3g the solid is as good as "
-                    "incompressible", ratio, _where(scene, part), STIFF, 1e3 * part.material.shear_modulus)
+                    "and the explicit step falls with its root; %s", ratio, _where(scene, part), STIFF, cure)
     h = float(space.h.min())
     if h > l / COARSE:
         log.warning("no element is finer than h = %.3g mm, l/h = %.2f (less than %g): onset and U are those of the "
                     "mesh; refine it to h <= l/3, or raise length_scale", h, l / h, COARSE)
-    angle, place = indicators.turning(space)
+    angle, place = indicators.turning(space, [plane.nodes for _, plane in symmetry_planes(scene)])
     if angle > SHARP:
         log.warning("a notch turns by %.0f degrees at one node, at %s mm (above %g): it is as sharp as elements "
                     "are small, which moves onset and U; round it with at least 4 elements", angle,
@@ -78,6 +84,25 @@ def check_onset(scene: Scene, state: State) -> None:
                     "onset and U are those of the mesh; refine it there to h <= l/3, or raise length_scale",
                     place_text(space.X[weakest]), h, l / h, COARSE)
     check_pressure(scene, state)
+    check_volume(scene, state)
+
+
+def check_volume(scene: Scene, state: State) -> None:
+    """A nearly incompressible body (k/mu above :data:`LOCKS`) whose stresses have grown beside its bulk modulus."""
+    if scene.controls.element == "planestress":
+        return
+    space = scene.sample.space
+    for part in scene.parts:
+        k, there = part.material.bulk_modulus, part.elements[~state.deleted[part.elements]]
+        if not there.size or k < LOCKS * part.material.shear_modulus:
+            continue
+        change = np.abs(indicators.element_pressure(space, state.u, 1.0)[there])
+        mean = float(change @ space.V[there] / space.V[there].sum())
+        if mean > SWELLING:
+            log.warning("the volume has changed by %.2g %% on average (above %g)%s, though k/mu = %.3g: stresses are "
+                        "no longer small beside bulk_modulus = %g MPa, and the body is as compressible as that; for a "
+                        "nearly incompressible one raise it to %.2g MPa", 100 * mean, 100 * SWELLING,
+                        _where(scene, part), k / part.material.shear_modulus, k, k * mean / (0.2 * SWELLING))
 
 
 def check_pressure(scene: Scene, state: State) -> None:

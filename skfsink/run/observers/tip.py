@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import logging
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ import numpy as np
 from ...errors import place_text
 from ...fem.indicators import Corner, below, corner_near
 from ...fem.space import Space
+from ...meshing.cracks import InitialCrack
 from ...meshing.edge import ALONG
 from .range import SHARP
 
@@ -48,13 +50,22 @@ def is_local(space: Space, corner: Corner, loaded: np.ndarray) -> bool:
     return bool(loaded[below(space, corner, depth)].min(initial=np.inf) < LOCAL * loaded.max())
 
 
-def check_tip(space: Space, element: int, loaded: np.ndarray) -> dict[str, Any]:
+def _touches(space: Space, crack: InitialCrack, place: np.ndarray) -> bool:
+    """Whether a place is at the elements of a crack, by half of an element."""
+    beside = np.linalg.norm(space.X[space.conn[crack.elements]] - place, axis=2).min(axis=1)
+    return bool((beside <= 0.5 * space.h[crack.elements]).any())
+
+
+def check_tip(space: Space, element: int, loaded: np.ndarray, planes: Sequence[np.ndarray] = (),
+              cracks: Sequence[InitialCrack] = ()) -> dict[str, Any]:
     """Warn where the onset, in an element, is that of a mesh that does not resolve the notch there.
 
     Parameters
     ----------
     space, element: the mesh, and where it begins to fail.
     loaded: greatest W/Phi of each element, (ne,).
+    planes: nodes of each plane of symmetry: what ends there is looked at with its image.
+    cracks: that the body has from the start: their elements are none of it, so that their ends are notches.
 
     Returns
     -------
@@ -62,7 +73,8 @@ def check_tip(space: Space, element: int, loaded: np.ndarray) -> dict[str, Any]:
     which the onset is expected to be late, and `place_mm`; radius and late are None at a sharp corner. Empty where the
     surface does not turn inwards, or the load is not local there.
     """
-    corner = corner_near(space, element)
+    gone = np.concatenate([crack.elements for crack in cracks]) if cracks else None
+    corner = corner_near(space, element, planes, gone)
     if corner is None:
         return {}
     radius, sharp = corner.radius, corner.angle > SHARP
@@ -71,7 +83,13 @@ def check_tip(space: Space, element: int, loaded: np.ndarray) -> dict[str, Any]:
     delay = late(corner.thickness / radius)
     figures = {"radius_mm": None if sharp else radius, "elements_per_radius": math.degrees(1.0) / corner.angle,
                "thickness_mm": corner.thickness, "late": None if sharp else delay, "place_mm": corner.place.tolist()}
-    if sharp:
+    at = next((crack.name for crack in cracks if _touches(space, crack, corner.place)), "")
+    if sharp and at:
+        log.warning("the body begins to fail at the crack %s, at %s mm, whose end is as sharp as the elements there "
+                    "are small (h = %.3g mm): the onset hangs on their size, and falls about as its root; compare "
+                    "bodies with equal elements there, or mesh a notch with a round tip", at, place_text(corner.place),
+                    corner.thickness)
+    elif sharp:
         log.warning("the body begins to fail at a sharp corner, which turns by %.0f degrees (above %g), at %s mm: the "
                     "onset hangs on the size of the elements there; round it", corner.angle, SHARP,
                     place_text(corner.place))
