@@ -1,4 +1,4 @@
-"""Decks and mesh files as people have them: what comes of each, beside the right value; `docs/inputs.md` has the table.
+"""Decks and mesh files that are easily misread: the result of each, beside the right value in `docs/inputs.md`.
 
 Runs that take longer are marked slow; the reading of their meshes is tested in any case.
 """

@@ -71,7 +71,7 @@ def test_what_tangents_in_parts_do_not_know(mesh: Path, tmp_path: Path) -> None:
     """Fails if a body is loaded first, or an option is left out without a word."""
     said = finished(2, "-m", "skfsink.cases.single_edge_notch", "--mesh", mesh, *SMALL, "--kernels", "forms",
                     "--analysis", "quasistatic", "--linear", "petsc-gamg", "--out", tmp_path / "run", status=2)
-    assert "linear petsc-gamg on several ranks does not know kernels forms: start it on one rank, or take " \
+    assert "linear petsc-gamg on several ranks cannot compute kernels forms: start it on one rank, or take " \
         "linear = 'direct', with which the first rank loads the body" in said
     assert not (tmp_path / "run").exists()
 

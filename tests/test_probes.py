@@ -437,10 +437,10 @@ def test_names_of_probes_are_those_of_files(name: Any) -> None:
     ({}, "probe p: kind is missing; it must be one of point, line, mean, reaction, volume, opening, release_rate"),
     ({"kind": "dot"}, "probe p: kind must be one of point, line,"),
     ({"kind": "release_rate"}, "probe p: a release_rate needs every"),
-    ({"kind": "release_rate", "every": 1e-6, "to": [0, 0]}, "probe p: to is nothing of a release_rate"),
+    ({"kind": "release_rate", "every": 1e-6, "to": [0, 0]}, "probe p: to is no key of a release_rate"),
     ({"kind": "point"}, "probe p: a point needs position"),
     ({"kind": "line", "position": [0, 0], "to": [1, 1]}, "probe p: a line needs points"),
-    ({"kind": "point", "position": [0, 0], "to": [1, 1]}, "probe p: to is nothing of a point, which takes position, "),
+    ({"kind": "point", "position": [0, 0], "to": [1, 1]}, "probe p: to is no key of a point, which takes position, "),
     ({"kind": "opening", "position": [0, 0]}, "probe p: an opening needs to or to_boundary"),
     ({"kind": "opening", "position": [0, 0], "boundary": "x", "to": [1, 1]},
      "probe p: an opening needs position or boundary, not both")])

@@ -322,7 +322,7 @@ def test_parts_add_up_to_the_whole_body(count: int) -> None:
 def test_what_several_ranks_do_not_know(option: str, said: str, mesh: Path, tmp_path: Path) -> None:
     """Fails if a body is loaded first, or an option is left out without a word."""
     text = finished(on(2, *case("--mesh", mesh, *SMALL, option, "--out", tmp_path / "run")), 2)
-    assert text == f"skfsink: several ranks do not know {said}: start it on one rank\n"
+    assert text == f"skfsink: several ranks cannot compute {said}: start it on one rank\n"
     assert not (tmp_path / "run").exists()
 
 

@@ -1,4 +1,4 @@
-"""Held against what is known: pulses, tearing, cavitation, branching, peeling, and the table that says so."""
+"""Validation against what is known: pulses, tearing, cavitation, branching, peeling, and the table that says so."""
 
 from __future__ import annotations
 

@@ -153,7 +153,8 @@ def _scene(arguments: dict[str, Any], options: Options) -> Scene:
                              f"got {options.speed:g}")
     for name in ("half", "dimensions", "mesh_layout"):
         if getattr(options, name) != getattr(Options, name):
-            raise ParameterError(f"{name} is for the cases of the paper; the mesh file {arguments['mesh']} is as it is")
+            raise ParameterError(f"{name} is for the cases of the paper; the mesh file {arguments['mesh']} is taken "
+                                 f"unchanged")
     sample = file_sample(Path(arguments["mesh"]), arguments.get("merge_nodes", 0.0))
     material, sink_law = options.stored_energy(), options.sink_law()
     regions = tuple(Region(law.name, sample.elements(law.name), *law.laws(material, sink_law))

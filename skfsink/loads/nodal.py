@@ -79,10 +79,10 @@ class NodalLoads:
         Raises
         ------
         ParameterError
-            The kind of load does not know parts.
+            The kind of load cannot be computed in parts.
         """
-        raise ParameterError(f"several ranks do not know loads of the kind {type(self).__name__}, which has no "
-                             f"of_part: start it on one rank")
+        raise ParameterError(f"several ranks cannot compute loads of the kind {type(self).__name__}, which has "
+                             f"no of_part: start it on one rank")
 
     def on(self, space: Space) -> None:
         """Act on the `space` of the part."""

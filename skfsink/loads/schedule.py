@@ -133,7 +133,7 @@ class Loading:
         Raises
         ------
         ParameterError
-            A kind of load does not know parts.
+            A kind of load cannot be computed in parts.
         """
         own = copy(self)
         own._shape = part.nodes.size, self._shape[1]

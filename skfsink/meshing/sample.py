@@ -203,7 +203,7 @@ def shape_sample(case: str, arguments: Mapping[str, Any], lift: Callable[[meshio
         names = (*inspect.signature(shape.make).parameters, "mesh_seed")
         words = [k for k in names if k in arguments]
         raise ParameterError(f"{', '.join(words[:-1])} and {words[-1]} are for the meshes {', '.join(shape.meshes)}; "
-                             f"the mesh file {name} is as it is")
+                             f"the mesh file {name} is taken unchanged")
     if name not in shape.meshes:
         return load_sample(case, name)  # which says what there is
     return load_sample(case, name, lambda: shape_mesh(case, arguments, settings), lift)

@@ -16,7 +16,7 @@ STATUS = "status.json"
 
 @dataclass(frozen=True)
 class Status:
-    """How far a run is. It is no result: it hangs on the clock, and a run that has come to its end has none.
+    """How far a run is. It is no result: it depends on the clock, and a run that has come to its end has none.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Held against what is known: `python -m skfsink.study.validation`.
+"""Validation against what is known: `python -m skfsink.study.validation`.
 
 Pulses against the acoustic tensor, one tearing energy in different test pieces, cavitation against closed forms and
 published values, and cracks that run along strips: what they take, where they branch, and when they outrun shear

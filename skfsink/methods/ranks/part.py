@@ -82,11 +82,11 @@ class PartOfBody:
 
 
 def check_parts(space: Space, loading: Loading, controls: BodyControls) -> None:
-    """Refuse what parts of a body do not know (ParameterError)."""
+    """Refuse what cannot be computed in parts of a body (ParameterError)."""
     what = ("contact" if controls.contact else "kernels forms" if controls.kernels != "compiled"
             else "the consistent sink" if controls.sink == "consistent" else "")
     if what:
-        raise ParameterError(f"several ranks do not know {what}: start it on one rank")
+        raise ParameterError(f"several ranks cannot compute {what}: start it on one rank")
     none = np.zeros(0, np.int64)
     loading.of_part(Selection(none, none, space.n_elements, space.n_nodes))
 

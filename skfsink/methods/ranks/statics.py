@@ -34,12 +34,12 @@ def statics_of(body: Body, controls: StaticsControls) -> Statics:
 
 
 def check_statics(loading: Loading, controls: BodyControls, linear: str) -> None:
-    """Refuse what tangents in parts do not know (ParameterError)."""
+    """Refuse what cannot be computed with tangents in parts (ParameterError)."""
     what = ("contact" if controls.contact else "pressures and fillings" if loading.followers is not None
             else "planes of an oblique direction" if loading.sliding is not None
             else "kernels forms" if controls.kernels != "compiled" else "")
     if what:
-        raise ParameterError(f"linear {linear} on several ranks does not know {what}: start it on one rank, or take "
+        raise ParameterError(f"linear {linear} on several ranks cannot compute {what}: start it on one rank, or take "
                              f"linear = 'direct', with which the first rank loads the body")
 
 

@@ -280,7 +280,7 @@ class Guard(Observer):
         first, most = self.overlaps or (found.depth, found.depth)
         self.overlaps = [first, max(most, found.depth)]
         log.warning("faces pass through each other by %.3g mm at %s, near %s mm of the undeformed body (%.2g of the "
-                    "element there), and what follows is a body that reaches into itself: %s", found.depth,
+                    "element there), and from then on the body overlaps itself: %s", found.depth,
                     self._when(state), place_text(found.place), found.depth / found.size, self._overlap_cure)
 
     def check_stress(self, state: State, crushed: np.ndarray) -> None:

@@ -22,7 +22,7 @@ _CELLS = {2: 512, 3: 96}     # of the grid in which nodes are looked for, along 
 
 
 class Overlap(NamedTuple):
-    """How far a body reaches into itself.
+    """How far a body overlaps itself.
 
     Attributes
     ----------

@@ -174,7 +174,7 @@ def probe_of(table: Mapping[str, Any]) -> Observer:
 
 def _only(name: str, kind: str, values: Mapping[str, Any], allowed: Iterable[str]) -> dict[str, Any]:
     if others := [key for key in values if key not in allowed]:
-        raise ParameterError(f"probe {name}: {others[0]} is nothing of a {kind}, which takes {', '.join(allowed)}")
+        raise ParameterError(f"probe {name}: {others[0]} is no key of a {kind}, which takes {', '.join(allowed)}")
     return dict(values)
 
 

@@ -54,8 +54,8 @@ def check_scene(scene: Scene) -> None:
                     "mesh; refine it to h <= l/3, or raise length_scale", h, l / h, COARSE)
     angle, place = indicators.turning(space, [plane.nodes for _, plane in symmetry_planes(scene)])
     if angle > SHARP:
-        log.warning("a notch turns by %.0f degrees at one node, at %s mm (above %g): it is as sharp as elements "
-                    "are small, which moves onset and U; round it with at least 4 elements", angle,
+        log.warning("a notch turns by %.0f degrees at one node, at %s mm (above %g): its sharpness is that "
+                    "of the mesh, on which onset and U depend; round it with at least 4 elements", angle,
                     place_text(place), SHARP)
     c = scene.controls
     if c.analysis != "quasistatic" and c.integrator == "explicit":

@@ -91,7 +91,7 @@ def check_tip(space: Space, element: int, loaded: np.ndarray, planes: Sequence[n
                     corner.thickness)
     elif sharp:
         log.warning("the body begins to fail at a sharp corner, which turns by %.0f degrees (above %g), at %s mm: the "
-                    "onset hangs on the size of the elements there; round it", corner.angle, SHARP,
+                    "onset depends on the size of the elements there; round it", corner.angle, SHARP,
                     place_text(corner.place))
     elif delay > LATE:
         log.warning("the body begins to fail at a notch of radius %.2g mm, with %.2g elements in a radius, at %s mm: "
