@@ -86,7 +86,7 @@ def check_tip(space: Space, element: int, loaded: np.ndarray, planes: Sequence[n
     at = next((crack.name for crack in cracks if _touches(space, crack, corner.place)), "")
     if sharp and at:
         log.warning("the body begins to fail at the crack %s, at %s mm, whose end is as sharp as the elements there "
-                    "are small (h = %.3g mm): the onset hangs on their size, and falls about as its root; compare "
+                    "are small (h = %.3g mm): the onset depends on their size, and falls about as its root; compare "
                     "bodies with equal elements there, or mesh a notch with a round tip", at, place_text(corner.place),
                     corner.thickness)
     elif sharp:
