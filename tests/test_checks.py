@@ -19,6 +19,7 @@ from plates import invoke_program, plate
 from skfsink.errors import ParameterError
 from skfsink.fem.space import Space
 from skfsink.loads.grips import Grip, Ramp, Traction
+from skfsink.loads.pressure import Pressure
 from skfsink.loads.rigid import free_motions
 from skfsink.material import AAA, SinkLaw
 from skfsink.material.library import material_from
@@ -209,6 +210,34 @@ def test_grips_that_only_carry_the_body_along_are_refused():
     for grips in ((Grip("top", (0.0, 1e-3)),), (Grip("top", (0.0, 1e-3)), Grip("bottom", (0.0, None)))):
         with pytest.raises(ParameterError, match="the grips move the body as a whole and strain nothing"):
             checks.refuse(dataclasses.replace(scene(), grips=grips))
+
+
+@pytest.mark.parametrize("kind", ["quad", "hexahedron"])
+def test_loads_that_grips_take_up_are_refused(kind: str):
+    """Fails if a traction or pressure on a held boundary strains nothing without a word, or one that does something is
+    refused: beside the grip, along a free component, on a side that is held in part, or in cracks to come."""
+    dim = 2 if kind == "quad" else 3
+    sample = sample_of(Space(grid(kind, (6, 6, 2)[:dim], 0.5)))
+    held, none = (0.0,) * dim, (None,) * dim
+    bottom, roller, x, y = Grip("bottom", held), Grip("left", (0.0, *none[1:])), np.eye(dim)[0], np.eye(dim)[1]
+
+    def loaded(grips: tuple[Grip, ...], *loads: Traction | Pressure) -> None:
+        checks.refuse(Scene("block", "Block", {}, sample, AAA(), SinkLaw(), (bottom, *grips),
+                            tuple(load for load in loads if isinstance(load, Traction)),
+                            tuple(load for load in loads if isinstance(load, Pressure))))
+
+    for grips, load, message in (
+            ((Grip("top", (0.0, 1e-3, *held[2:])),), Traction("top", tuple(1e-3 * y)),
+             "the traction on top acts along y, which grips hold at all of its nodes, and strains nothing"),
+            ((roller,), Traction("left", (1e-3, 1e-3, *held[2:])), "the traction on left acts along x, which"),
+            ((Grip("top", (0.0, 1e-3, *held[2:])),), Pressure("top", 1e-3), "the pressure on top acts where grips"),
+            ((roller,), Pressure("left", Ramp((0.0, 1.0), (0.0, 1e-2))), "the pressure on left acts where grips")):
+        with pytest.raises(ParameterError, match=message):
+            loaded(grips, load)
+    loaded((roller,), Traction("right", tuple(1e-3 * x)), Pressure("top", 1e-3))
+    loaded((roller,), Traction("left", tuple(1e-3 * y)))
+    loaded((Grip("top", (0.0, 1e-3, *held[2:])),), Pressure("left", 1e-3), Traction("left", tuple(1e-3 * y)))
+    loaded((Grip("top", (0.0, 1e-3, *held[2:])),), Pressure("top", 1e-3, in_crack=True))
 
 
 def test_a_piece_that_nothing_holds_is_refused():

@@ -105,6 +105,12 @@ class DeadLoad(NodalLoads):
         total: np.ndarray = self._areas[number].sum() * self.traction(self._time)[number]
         return total
 
+    def idle(self, free: np.ndarray) -> list[tuple[int, int]]:
+        """Numbers and axes of the components that strain nothing, as all nodes they act on are held; `free` (n, dim).
+        """
+        return [(number, axis) for number, rate in enumerate(self._rates) for axis, value in enumerate(rate)
+                if (isinstance(value, Ramp) or value) and not free[self.nodes[self._areas[number] > 0.0], axis].any()]
+
     def mean(self, number: int, u: np.ndarray) -> np.ndarray:
         """Mean of `u` (n, dim) over the boundary of one of the tractions, (dim,), while it is whole."""
         full = np.bincount(self._corner, self._weight * (self._owner[self._facet] == number), minlength=self.nodes.size)

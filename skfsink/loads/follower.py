@@ -146,6 +146,20 @@ class FollowerLoads:
                      self.space.axisymmetric)
         out[self._wet.nodes] += part
 
+    def idle(self, free: np.ndarray) -> list[int]:
+        """Numbers of the loads that strain nothing: where they push, all nodes are held, and no crack is to be theirs.
+
+        `free` (n, dim) is of the degrees of freedom.
+        """
+        found, alone = [], np.eye(len(self.loads))
+        for number, load in enumerate(self.loads):
+            force = np.zeros_like(self._wet.X)
+            add_pressure(self._wet.corner, alone[number][self._wet.owner], self._wet.X, force, self.space.axisymmetric)
+            moves = float(np.abs(force[free[self._wet.nodes]]).max(initial=0.0))
+            if moves <= 1e-9 * float(np.abs(force).max()) and not (isinstance(load, Pressure) and load.in_crack):
+                found.append(number)
+        return found
+
     def size(self, u: np.ndarray) -> float:
         """Norm of the nodal forces at `u` [N; N/mm in 2D]."""
         out = np.zeros_like(self.space.X)

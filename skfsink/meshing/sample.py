@@ -20,6 +20,7 @@ from ..system.shipped import data_folder
 from .files.pieces import check_one_piece, hinges, merged
 from .files.split import counted, needs_split
 from .files.tidy import notes_of, place
+from .files.unmatched import check_sides, slit_note
 from .kept_mesh import SUFFIX
 from .mesh_file import check_mesh, one_line, quietly, read_mesh_file
 from .reused import reusable
@@ -236,6 +237,9 @@ def _from_file(path: Path, merge_nodes: float = 0.0, option: bool = False) -> Sa
         check_mesh(name, merged(name, data, merge_nodes))
     sample = _from_meshio(str(path), data, source=str(path))
     check_one_piece(sample.name, shlex.quote(name), sample.space, option)
+    check_sides(sample.name, sample.space)
+    if slit := slit_note(sample.space):
+        sample = replace(sample, notes=(*sample.notes, slit))
     if len(nodes := hinges(sample.space)):
         what = "node" if sample.space.dim == 2 else "node or edge"
         note = (f"parts of the body hang together by a single {what}, at {len(nodes)} node(s), such as "

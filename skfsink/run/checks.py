@@ -119,7 +119,7 @@ def refuse(scene: Scene) -> None:
     ParameterError
         A body smaller than l, or elements of many l; a density or wave speed of no solid; a strength of none; grips
         faster than waves before a static onset; more steps or frames than can be made; a body, or a piece of one,
-        that nothing holds or nothing strains.
+        that nothing holds or nothing strains; a traction or pressure that grips take up.
     """
     space = scene.sample.space
     check_size(space, scene.sink_law.length_scale)
@@ -128,6 +128,7 @@ def refuse(scene: Scene) -> None:
     loading = scene.loading()
     if _dynamic(scene):
         _refuse_events(scene, loading)
+    _refuse_idle(scene, loading)
     label = pieces(space)
     count = int(label.max()) + 1
     if count > PIECES:
@@ -142,9 +143,22 @@ def refuse(scene: Scene) -> None:
         raise ParameterError("nothing loads the body: all its grips, tractions and pressures are still; give one of "
                              "them a velocity (a rate), or a ramp that rises")
     if not (scene.tractions or scene.pressures or scene.velocities) and moves_as_a_whole(space, loading, label):
-        whole = "the body" if count == 1 else f"each of the {count} pieces of the body, which are not joined,"
+        whole = "the body" if count == 1 else f"each of the {count} pieces of the body, which share no side,"
         raise ParameterError(f"the grips move {whole} as a whole and strain nothing: hold another boundary in the "
                              f"direction of the one that moves{', or merge nodes that coincide' if count > 1 else ''}")
+
+
+def _refuse_idle(scene: Scene, loading: Loading) -> None:
+    """Refuse tractions and pressures that act on held nodes alone, and would strain nothing."""
+    free = loading.free.reshape(scene.sample.space.X.shape)
+    if loading.tractions is not None and (idle := loading.tractions.idle(free)):
+        boundary, axis = scene.tractions[idle[0][0]].boundary, "xyz"[idle[0][1]]
+        raise ParameterError(f"the traction on {boundary} acts along {axis}, which grips hold at all of its nodes, and "
+                             f"strains nothing: leave {axis} out of the grip, or of the traction")
+    if loading.followers is not None and (useless := loading.followers.idle(free)):
+        boundary = scene.pressures[useless[0]].boundary
+        raise ParameterError(f"the pressure on {boundary} acts where grips hold all of its nodes against it, and "
+                             f"strains nothing: end the grip short of {boundary}, or leave the pressure out")
 
 
 def check_size(space: Space, length_scale: float, *, of_metres: str = "multiply those of a mesh in m by 1000",
