@@ -471,6 +471,13 @@ def test_surfaces(tmp_path: Path) -> None:
     assert any("'surface:tip'" in note for note in own.notes)
 
 
+def test_surfaces_inside_of_a_body_are_noted(tmp_path: Path) -> None:
+    """Fails if a surface of a wrong side of its elements, which lies within the body, is held in silence."""
+    mesh = read(tmp_path, PLATE + "*Elset, elset=upper, generate\n3, 4\n*Surface, name=top\nupper, S1\n")
+    assert "the surface 'top' (line 18) has 2 face(s) S1 inside of the body, between two elements" in notes(mesh)
+    assert "inside of the body" not in notes(read(tmp_path, PLATE + "*Surface, name=low\n1, S1\n2, S1\nall\n"))
+
+
 def test_surfaces_of_a_tool(tmp_path: Path) -> None:
     """Fails if a rigid tool and its surface end the reading, or are left out in silence."""
     tool = "*Element, type=R2D2, elset=tool\n11, 10, 11\n*Surface, name=tool\ntool, SPOS\n"

@@ -596,7 +596,7 @@ def test_sides_that_a_run_refuses(tmp_path: Path) -> None:
     status, err, out = invoke_program("mesh", tmp_path / "in.vtu", tmp_path / "out.vtu", "--length-scale", "1")
     assert (status, err) == (0, "") and "a run refuses this: mesh in: 1 node(s) lie in sides of elements" in out
     assert "such as (1, 1) mm" in out
-    with pytest.raises(MeshError, match="1 node.s. lie in sides"):
+    with pytest.raises(MeshError, match=r"1 node.s. lie in sides"):
         file_sample(tmp_path / "out.vtu")
 
 
