@@ -195,6 +195,23 @@ def test_pieces_that_share_a_node_turn_about_it():
     assert motions(hinge, bottom="xy", top="x") == []
 
 
+def test_a_limiter_of_other_constants_is_warned_of(caplog: pytest.LogCaptureFixture):
+    """Fails if constants are changed and the limiter of the old ones is taken in silence, or a limiter that was given,
+    or one of nearly the same constants, is complained of."""
+    stiff, law = AAA(c1=3.0), SinkLaw()
+    (text,) = said(caplog, scene(material=stiff))
+    assert text.startswith("phi = 0.1686 MPa belongs to aaa with its default constants, of shear modulus 1.23 MPa, and "
+                           "here that is 6 MPa: give the phi")
+    assert said(caplog, scene(material=stiff, law=SinkLaw(phi=0.8))) == []
+    assert said(caplog, scene(material=AAA(c1=0.7))) == []
+    upper = np.flatnonzero(PLAIN.space.X[PLAIN.space.conn].mean(axis=1)[:, 1] > 0.5)
+    lid = Region("lid", upper, material_from("gent", {"mu": 1.0}), dataclasses.replace(law, phi=15.62))
+    (text,) = said(caplog, dataclasses.replace(scene(), regions=(lid,)))
+    assert "gent" in text and "1 MPa of region lid" in text
+    known = {"regions": ({"name": "lid", "material": "gent", "constants": "mu = 1 MPa", "phi": 15.62},)}
+    assert said(caplog, dataclasses.replace(scene(), regions=(lid,), parameters=known)) == []
+
+
 def test_grips_that_leave_a_motion_are_warned_of(caplog: pytest.LogCaptureFixture):
     """Fails if a plate pulled at both ends, free sideways, drifts without a word."""
     of = dataclasses.replace(scene(), grips=(Grip("top", (None, 1e-3)), Grip("bottom", (None, -1e-3))))

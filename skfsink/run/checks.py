@@ -19,6 +19,7 @@ from ..fem import indicators
 from ..fem.space import Space
 from ..loads.rigid import free_motions, moves_as_a_whole, pieces
 from ..loads.schedule import Loading
+from ..material import MATERIALS, limiter_of
 from ..material.regions import Region
 from ..scene.scene import Scene
 
@@ -33,6 +34,7 @@ LARGEST_H = 100.0          # smallest element, in l, above which a mesh is refus
 DENSITY = 1e-3, 10.0, 25e3, 1e6    # kg/m^3: foams have 10 and more, osmium 22,600; t/mm^3 and g/cm^3 give less
 WAVES = 0.1, 6000.0, 2e4           # shear waves [m/s]: gels have 1, rubbers 20, steel 3200, diamond 12,000
 STRENGTH = 1e-10, 1e-5, 1e3, 1e6   # Phi/mu: glass has 1e-6, stretched rubbers 60 to 240
+OTHER = 0.2                        # change of the shear modulus by which a default limiter is another material's
 COMPRESSIBLE = 2.0 / 3.0           # k/mu below which Poisson's ratio is negative
 # --- the grips ---
 PIECES = 100                # of a mesh, joined at single nodes; more are elements that nothing joins
@@ -270,6 +272,14 @@ def _warn_of_material(scene: Scene, part: Region) -> None:
         log.warning("the energy limiter phi = %.3g MPa is %.2g of the shear modulus %.3g MPa (outside of %g to %g)%s: "
                     "it fails at strains of about %.2g; check the units of both (MPa)", phi, ratio,
                     material.shear_modulus, *STRENGTH[1:3], where, np.sqrt(2 * ratio))
+    law = next((name for name, kind in MATERIALS.items() if type(material) is kind), "")
+    given = any(table["name"] == part.name and "phi" in table for table in scene.parameters.get("regions", ()))
+    if law and phi == limiter_of(law).phi and not given:
+        usual = MATERIALS[law]().shear_modulus
+        if abs(material.shear_modulus / usual - 1) > OTHER:
+            log.warning("phi = %.4g MPa belongs to %s with its default constants, of shear modulus %.3g MPa, and here "
+                        "that is %.3g MPa%s: give the phi of this material, or its strength is that of the other one",
+                        phi, law, usual, material.shear_modulus, where)
     if stiff < COMPRESSIBLE:
         log.warning("k/mu = %.3g is so small (below %.2g)%s that Poisson's ratio is negative; check the units of "
                     "bulk_modulus (MPa) and of the constants", stiff, COMPRESSIBLE, where)
