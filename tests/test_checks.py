@@ -204,6 +204,8 @@ def test_a_limiter_of_other_constants_is_warned_of(caplog: pytest.LogCaptureFixt
                            "here that is 6 MPa: give the phi")
     assert said(caplog, scene(material=stiff, law=SinkLaw(phi=0.8))) == []
     assert said(caplog, scene(material=AAA(c1=0.7))) == []
+    fibres = material_from("hgo", {"angle": 20.0})  # of which a shear modulus says little
+    assert not any("belongs to" in text for text in said(caplog, scene(material=fibres, law=SinkLaw(phi=0.027))))
     upper = np.flatnonzero(PLAIN.space.X[PLAIN.space.conn].mean(axis=1)[:, 1] > 0.5)
     lid = Region("lid", upper, material_from("gent", {"mu": 1.0}), dataclasses.replace(law, phi=15.62))
     (text,) = said(caplog, dataclasses.replace(scene(), regions=(lid,)))

@@ -20,6 +20,7 @@ from ..fem.space import Space
 from ..loads.rigid import free_motions, moves_as_a_whole, pieces
 from ..loads.schedule import Loading
 from ..material import MATERIALS, limiter_of
+from ..material.constants import FROM_SHEAR
 from ..material.regions import Region
 from ..scene.scene import Scene
 
@@ -272,7 +273,7 @@ def _warn_of_material(scene: Scene, part: Region) -> None:
         log.warning("the energy limiter phi = %.3g MPa is %.2g of the shear modulus %.3g MPa (outside of %g to %g)%s: "
                     "it fails at strains of about %.2g; check the units of both (MPa)", phi, ratio,
                     material.shear_modulus, *STRENGTH[1:3], where, np.sqrt(2 * ratio))
-    law = next((name for name, kind in MATERIALS.items() if type(material) is kind), "")
+    law = next((name for name in FROM_SHEAR if type(material) is MATERIALS[name]), "")  # of isotropic laws
     given = any(table["name"] == part.name and "phi" in table for table in scene.parameters.get("regions", ()))
     if law and phi == limiter_of(law).phi and not given:
         usual = MATERIALS[law]().shear_modulus
