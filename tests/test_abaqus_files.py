@@ -111,6 +111,7 @@ def test_elements_of_four_nodes(kind: str, tmp_path: Path) -> None:
     is_plate(mesh)
     assert members(mesh, "all") == [0, 1, 2, 3]
     assert ("planestress" in notes(mesh)) == kind.upper().startswith("CPS")
+    assert mesh.info["element"] == {"CPS": "planestress", "CAX": "axisymmetric"}.get(kind.upper()[:3], "")
     assert ("axisymmetric" in notes(mesh)) == kind.upper().startswith("CAX")
     assert ("shells and membranes" in notes(mesh)) == (kind[0] in "MS")
 

@@ -214,6 +214,15 @@ def test_a_limiter_of_other_constants_is_warned_of(caplog: pytest.LogCaptureFixt
     assert said(caplog, dataclasses.replace(scene(), regions=(lid,), parameters=known)) == []
 
 
+def test_elements_of_another_kind_than_the_file_says_are_warned_of(caplog: pytest.LogCaptureFixture):
+    """Fails if a sheet of Abaqus is computed in plane strain without a warning, or one as it is meant is warned of."""
+    thin = dataclasses.replace(PLAIN, element="planestress")
+    (text,) = said(caplog, scene(thin))
+    assert text.startswith("the mesh file has elements of plane stress, and the run takes element = 'jbar', in plane "
+                           "strain: take element = 'planestress'")
+    assert said(caplog, scene(thin, element="planestress")) == []
+
+
 def test_grips_that_leave_a_motion_are_warned_of(caplog: pytest.LogCaptureFixture):
     """Fails if a plate pulled at both ends, free sideways, drifts without a word."""
     of = dataclasses.replace(scene(), grips=(Grip("top", (None, 1e-3)), Grip("bottom", (None, -1e-3))))

@@ -47,6 +47,7 @@ class Sample:
     notes: what was done to the mesh of a file while it was read, one line each.
     made: whether the mesh was made by gmsh, and is not a file of the user's or a committed one.
     source: path of the file of the user's that it was read from first; "" for other meshes.
+    element: what the elements of a file of Abaqus are by their type, "planestress" or "axisymmetric"; "" if open.
     vectors: arrays of vectors of the file by name, at the elements (ne, 3): those of points are averaged, whatever
         their sign.
     """
@@ -58,6 +59,7 @@ class Sample:
     cells: Mapping[str, np.ndarray] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     source: str = ""
+    element: str = ""
     vectors: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     def revolved(self) -> Sample:
@@ -277,6 +279,7 @@ def _from_meshio(name: str, data: meshio.Mesh, made: bool = False, source: str =
         raise MeshError(f"mesh {shown}: {error}") from None
     return Sample(info.get("name") or Path(name).stem, space, _boundaries(data, facet), info.get("made", made),
                   cells=_elements(data, kind), notes=notes_of(data), source=info.get("source", source),
+                  element=info.get("element", ""),
                   vectors=_vectors(data, kind, space.conn))
 
 

@@ -246,6 +246,11 @@ def warn(scene: Scene, folder: Path) -> None:
                     "length_scale", size, size / l, l, LEAST_BODY[1])
     for part in scene.parts:
         _warn_of_material(scene, part)
+    if (meant := scene.sample.element) and meant != scene.controls.element:
+        what = "plane stress" if meant == "planestress" else "a body of revolution"
+        log.warning("the mesh file has elements of %s, and the run takes element = '%s'%s: take element = '%s', or go "
+                    "on if it is meant", what, scene.controls.element,
+                    ", in plane strain" if scene.controls.element in ("jbar", "plain") else "", meant)
     loading = scene.loading()
     motions = [motion for motion in free_motions(space, loading.free, sliding=loading.sliding) if not motion.unheld]
     if motions:
