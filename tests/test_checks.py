@@ -223,6 +223,21 @@ def test_elements_of_another_kind_than_the_file_says_are_warned_of(caplog: pytes
     assert said(caplog, scene(thin, element="planestress")) == []
 
 
+def test_loads_on_a_part_of_their_boundary_are_warned_of(caplog: pytest.LogCaptureFixture):
+    """Fails if nodes inside of the body are named as loaded, and bear nothing, without a word; or if a whole side is
+    complained of."""
+    space = Space(grid("quad", (6, 6), 1.0))
+    row = np.flatnonzero(np.isclose(space.X[:, 1], 0.5) | np.isclose(space.X[:, 0], 1.0))
+    sample = dataclasses.replace(of := sample_of(space), boundaries={**of.boundaries, "row": row})
+    held = (Grip("bottom", (0.0, 0.0)),)
+    for kind, loads in (("traction", {"tractions": (Traction("row", (1e-3, 0.0)),)}),
+                        ("pressure", {"pressures": (Pressure("row", 1e-3),)})):
+        (text,) = said(caplog, Scene("block", "Block", {}, sample, AAA(), SinkLaw(), held, **loads))
+        assert text.startswith(f"the {kind} on row acts on a part of it: 6 of its 13 nodes are on no side of the ")
+    whole = (Traction("right", (1e-3, 0.0)),)
+    assert said(caplog, Scene("block", "Block", {}, sample, AAA(), SinkLaw(), held, whole)) == []
+
+
 def test_grips_that_leave_a_motion_are_warned_of(caplog: pytest.LogCaptureFixture):
     """Fails if a plate pulled at both ends, free sideways, drifts without a word."""
     of = dataclasses.replace(scene(), grips=(Grip("top", (None, 1e-3)), Grip("bottom", (None, -1e-3))))

@@ -14,8 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import ParameterError
+from ..errors import ParameterError, place_text
 from ..fem import indicators
+from ..fem.facets import boundary_facets
 from ..fem.space import Space
 from ..loads.rigid import free_motions, moves_as_a_whole, pieces
 from ..loads.schedule import Loading
@@ -258,6 +259,13 @@ def warn(scene: Scene, folder: Path) -> None:
                     "show; %s", ", and ".join(f"{m.piece} free to {m.name}" for m in motions[:3]),
                     f", and {len(motions) - 3} more motions" if len(motions) > 3 else "",
                     "; ".join(dict.fromkeys(m.cure for m in motions)))
+    for kind, load in (*(("traction", load) for load in scene.tractions), *(("pressure", p) for p in scene.pressures)):
+        nodes = scene.sample.nodes(load.boundary)
+        bare = np.setdiff1d(nodes, space.mesh.facets[:, boundary_facets(space, nodes)])
+        if bare.size:
+            log.warning("the %s on %s acts on a part of it: %d of its %d nodes are on no side of the surface that has "
+                        "all its nodes in it, such as the one at %s mm", kind, load.boundary, bare.size, nodes.size,
+                        place_text(space.X[bare[0]]))
     if _dynamic(scene):
         _warn_of_events(scene, loading, folder)
     elif _is_viscous(scene):

@@ -65,6 +65,7 @@ def slit_note(space: Space) -> str:
     if not len(pairs):
         return ""
     X = space.X[nodes[pairs[:, 0]]]
+    X = np.where(np.abs(X) < 1e-9 * np.ptp(space.X), 0.0, X)
     return (f"{len(pairs)} pair(s) of nodes coincide, between {place(X.min(axis=0))} and {place(X.max(axis=0))} mm: "
             f"the body is open there, as along a slit; if it is not meant, join them by merge_nodes")
 
