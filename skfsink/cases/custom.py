@@ -116,7 +116,8 @@ def custom(
         Summary, history and last state; its files are in the output folder.
     """
     if check_options(options).model:
-        raise ParameterError(f"model is for the cases of the paper, whose models were measured; got {options.model!r}")
+        raise ParameterError(f"model is for the cases of the paper, whose models were measured; got {options.model!r}: "
+                             f"leave it out, and set analysis, integrator, element and stop")
     if not isinstance(faces, str):
         raise ParameterError(f"faces must be text, names of boundaries with commas, such as 'back, front'; got "
                              f"{faces!r:.80}")
