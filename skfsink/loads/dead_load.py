@@ -24,8 +24,8 @@ class DeadLoad(NodalLoads):
     A traction acts on the facets of the surface all of whose nodes belong to its boundary. The facets of an element
     that has lost its force, at all its Gauss points, bear no load any more.
 
-    Memory: the load time last given to `at` and the elements last given to `keep`; `resultant`, `idle` and energies are of
-    the loads as these left them.
+    Memory: the load time last given to `at` and the elements last given to `keep`; `resultant`, `idle` and energies
+    are of the loads as these left them.
 
     Parameters
     ----------
