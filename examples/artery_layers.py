@@ -18,7 +18,8 @@ sk.write_mesh("tube.vtu", mesh)
 tube = sk.custom(mesh="tube.vtu", title="A tube of two layers", element="axisymmetric", out="results/tube",
                  overwrite=True, grips=[{"boundary": "bottom", "y": 0}, {"boundary": "top", "y": 0}],
                  pressures=[{"boundary": "left", "rate": "10 kPa/s"}], stop=lambda view: view.state.gamma.min() < 0.999,
-                 regions=[{"name": "adventitia", "material": "aaa", "constants": "c1 = 1.234, c2 = 2.43"}],
+                 regions=[{"name": "adventitia", "material": "aaa", "constants": "c1 = 1.234, c2 = 2.43",
+                           "phi": "168.6 kPa"}],
                  probes=[{"name": "wall", "kind": "line", "position": [1.001, 0.2], "to": [1.199, 0.2], "points": 41,
                           "quantity": "stress"}])
 last = -2  # increment before the sink had begun

@@ -70,6 +70,8 @@ def in_unit(name: str, text: str, unit: str, plain: bool = False) -> float:
             raise ValueError("decimals stand after a point, and nothing between thousands")
         if parts is None or (parts["ten"] and "e" in parts["number"].lower()):
             raise ValueError
+        if unit in ("MPa", "MPa/s") and re.search(r"(?<![A-Za-zµ])mPa", typed):
+            raise ValueError("mPa is a thousandth of a pascal: write MPa, or 1e-3 Pa if it is meant")
         number = float(parts["number"] + (f"e{parts['ten']}" if parts["ten"] else ""))
         if parts["unit"] == unit or (plain and not parts["unit"]):
             return number

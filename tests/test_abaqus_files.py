@@ -111,6 +111,7 @@ def test_elements_of_four_nodes(kind: str, tmp_path: Path) -> None:
     is_plate(mesh)
     assert members(mesh, "all") == [0, 1, 2, 3]
     assert ("planestress" in notes(mesh)) == kind.upper().startswith("CPS")
+    assert mesh.info["element"] == {"CPS": "planestress", "CAX": "axisymmetric"}.get(kind.upper()[:3], "")
     assert ("axisymmetric" in notes(mesh)) == kind.upper().startswith("CAX")
     assert ("shells and membranes" in notes(mesh)) == (kind[0] in "MS")
 
@@ -469,6 +470,13 @@ def test_surfaces(tmp_path: Path) -> None:
     assert own.nodes("n").tolist() == [4, 8] and own.nodes("both").tolist() == [0, 1, 2, 3, 5, 6, 7, 8]
     assert own.nodes("tip").tolist() == [8] and own.nodes("surface:tip").tolist() == [0, 1, 2]
     assert any("'surface:tip'" in note for note in own.notes)
+
+
+def test_surfaces_inside_of_a_body_are_noted(tmp_path: Path) -> None:
+    """Fails if a surface of a wrong side of its elements, which lies within the body, is held in silence."""
+    mesh = read(tmp_path, PLATE + "*Elset, elset=upper, generate\n3, 4\n*Surface, name=top\nupper, S1\n")
+    assert "the surface 'top' (line 18) has 2 face(s) S1 inside of the body, between two elements" in notes(mesh)
+    assert "inside of the body" not in notes(read(tmp_path, PLATE + "*Surface, name=low\n1, S1\n2, S1\nall\n"))
 
 
 def test_surfaces_of_a_tool(tmp_path: Path) -> None:

@@ -19,6 +19,7 @@ from plates import invoke_program, plate
 from skfsink.errors import ParameterError
 from skfsink.fem.space import Space
 from skfsink.loads.grips import Grip, Ramp, Traction
+from skfsink.loads.pressure import Pressure
 from skfsink.loads.rigid import free_motions
 from skfsink.material import AAA, SinkLaw
 from skfsink.material.library import material_from
@@ -194,6 +195,49 @@ def test_pieces_that_share_a_node_turn_about_it():
     assert motions(hinge, bottom="xy", top="x") == []
 
 
+def test_a_limiter_of_other_constants_is_warned_of(caplog: pytest.LogCaptureFixture):
+    """Fails if constants are changed and the limiter of the old ones is taken in silence, or a limiter that was given,
+    or one of nearly the same constants, is complained of."""
+    stiff, law = AAA(c1=3.0), SinkLaw()
+    (text,) = said(caplog, scene(material=stiff))
+    assert text.startswith("phi = 0.1686 MPa belongs to aaa with its default constants, of shear modulus 1.23 MPa, and "
+                           "here that is 6 MPa: give the phi")
+    assert said(caplog, scene(material=stiff, law=SinkLaw(phi=0.8))) == []
+    assert said(caplog, scene(material=AAA(c1=0.7))) == []
+    fibres = material_from("hgo", {"angle": 20.0})  # of which a shear modulus says little
+    assert not any("belongs to" in text for text in said(caplog, scene(material=fibres, law=SinkLaw(phi=0.027))))
+    upper = np.flatnonzero(PLAIN.space.X[PLAIN.space.conn].mean(axis=1)[:, 1] > 0.5)
+    lid = Region("lid", upper, material_from("gent", {"mu": 1.0}), dataclasses.replace(law, phi=15.62))
+    (text,) = said(caplog, dataclasses.replace(scene(), regions=(lid,)))
+    assert "gent" in text and "1 MPa of region lid" in text
+    known = {"regions": ({"name": "lid", "material": "gent", "constants": "mu = 1 MPa", "phi": 15.62},)}
+    assert said(caplog, dataclasses.replace(scene(), regions=(lid,), parameters=known)) == []
+
+
+def test_elements_of_another_kind_than_the_file_says_are_warned_of(caplog: pytest.LogCaptureFixture):
+    """Fails if a sheet of Abaqus is computed in plane strain without a warning, or one as it is meant is warned of."""
+    thin = dataclasses.replace(PLAIN, element="planestress")
+    (text,) = said(caplog, scene(thin))
+    assert text.startswith("the mesh file has elements of plane stress, and the run takes element = 'jbar', in plane "
+                           "strain: take element = 'planestress'")
+    assert said(caplog, scene(thin, element="planestress")) == []
+
+
+def test_loads_on_a_part_of_their_boundary_are_warned_of(caplog: pytest.LogCaptureFixture):
+    """Fails if nodes inside of the body are named as loaded, and bear nothing, without a word; or if a whole side is
+    complained of."""
+    space = Space(grid("quad", (6, 6), 1.0))
+    row = np.flatnonzero(np.isclose(space.X[:, 1], 0.5) | np.isclose(space.X[:, 0], 1.0))
+    sample = dataclasses.replace(of := sample_of(space), boundaries={**of.boundaries, "row": row})
+    held = (Grip("bottom", (0.0, 0.0)),)
+    for kind, loads in (("traction", {"tractions": (Traction("row", (1e-3, 0.0)),)}),
+                        ("pressure", {"pressures": (Pressure("row", 1e-3),)})):
+        (text,) = said(caplog, Scene("block", "Block", {}, sample, AAA(), SinkLaw(), held, **loads))
+        assert text.startswith(f"the {kind} on row acts on a part of it: 6 of its 13 nodes are on no side of the ")
+    whole = (Traction("right", (1e-3, 0.0)),)
+    assert said(caplog, Scene("block", "Block", {}, sample, AAA(), SinkLaw(), held, whole)) == []
+
+
 def test_grips_that_leave_a_motion_are_warned_of(caplog: pytest.LogCaptureFixture):
     """Fails if a plate pulled at both ends, free sideways, drifts without a word."""
     of = dataclasses.replace(scene(), grips=(Grip("top", (None, 1e-3)), Grip("bottom", (None, -1e-3))))
@@ -209,6 +253,34 @@ def test_grips_that_only_carry_the_body_along_are_refused():
     for grips in ((Grip("top", (0.0, 1e-3)),), (Grip("top", (0.0, 1e-3)), Grip("bottom", (0.0, None)))):
         with pytest.raises(ParameterError, match="the grips move the body as a whole and strain nothing"):
             checks.refuse(dataclasses.replace(scene(), grips=grips))
+
+
+@pytest.mark.parametrize("kind", ["quad", "hexahedron"])
+def test_loads_that_grips_take_up_are_refused(kind: str):
+    """Fails if a traction or pressure on a held boundary strains nothing without a word, or one that does something is
+    refused: beside the grip, along a free component, on a side that is held in part, or in cracks to come."""
+    dim = 2 if kind == "quad" else 3
+    sample = sample_of(Space(grid(kind, (6, 6, 2)[:dim], 0.5)))
+    held, none = (0.0,) * dim, (None,) * dim
+    bottom, roller, x, y = Grip("bottom", held), Grip("left", (0.0, *none[1:])), np.eye(dim)[0], np.eye(dim)[1]
+
+    def loaded(grips: tuple[Grip, ...], *loads: Traction | Pressure) -> None:
+        checks.refuse(Scene("block", "Block", {}, sample, AAA(), SinkLaw(), (bottom, *grips),
+                            tuple(load for load in loads if isinstance(load, Traction)),
+                            tuple(load for load in loads if isinstance(load, Pressure))))
+
+    for grips, load, message in (
+            ((Grip("top", (0.0, 1e-3, *held[2:])),), Traction("top", tuple(1e-3 * y)),
+             "the traction on top acts along y, which grips hold at all of its nodes, and strains nothing"),
+            ((roller,), Traction("left", (1e-3, 1e-3, *held[2:])), "the traction on left acts along x, which"),
+            ((Grip("top", (0.0, 1e-3, *held[2:])),), Pressure("top", 1e-3), "the pressure on top acts where grips"),
+            ((roller,), Pressure("left", Ramp((0.0, 1.0), (0.0, 1e-2))), "the pressure on left acts where grips")):
+        with pytest.raises(ParameterError, match=message):
+            loaded(grips, load)
+    loaded((roller,), Traction("right", tuple(1e-3 * x)), Pressure("top", 1e-3))
+    loaded((roller,), Traction("left", tuple(1e-3 * y)))
+    loaded((Grip("top", (0.0, 1e-3, *held[2:])),), Pressure("left", 1e-3), Traction("left", tuple(1e-3 * y)))
+    loaded((Grip("top", (0.0, 1e-3, *held[2:])),), Pressure("top", 1e-3, in_crack=True))
 
 
 def test_a_piece_that_nothing_holds_is_refused():

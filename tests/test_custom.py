@@ -266,6 +266,7 @@ def tomllib_text(data: dict[str, Any]) -> str:
 
 @pytest.mark.parametrize(("tables", "said"), [
     ("[[grips]]\nx = 0", "grips: boundary must be a name"), ("[[grips]]\nboundary = 'top'\nw = 0", "unknown key 'w'"),
+    ("[[grips]]\nboundary = 'top'", "grip top holds nothing: give it x, y, z, normal or angle"),
     ("[[grips]]\nboundary = 'top'\ny = '1 mm'", "grip top, y must be a quantity in mm/s"),
     ("[[grips]]\nboundary = 'top'\ny = true", "grip top, y must be a number"),
     ("[[grips]]\nboundary = 'top'\ny = [[0, 0]]", "a ramp must have at least two points"),

@@ -45,6 +45,7 @@ def parameters(folder: Path, text: str, case: str = "single_edge_notch") -> dict
     ("1.433·10⁻⁹ t·mm⁻³", "kg/m^3", 1433), ("0.1686 N/mm2", "MPa", 0.1686), ("0.1686 N/mm²", "MPa", 0.1686),
     ("0.1686 N mm⁻²", "MPa", 0.1686), ("0.1686 N/(mm²)", "MPa", 0.1686), ("2 kN/mm2", "MPa", 2000),
     ("2e6 kg/(m s2)", "MPa", 2), ("2e6 kg/(m·s²)", "MPa", 2), ("2e6 kg/m/s2", "MPa", 2), ("5 MN/m²", "MPa", 5),
+    ("1 mPa s", "MPa s", 1e-9),
     ("5 µs", "s", 5e-6), ("5 \u03bcs", "s", 5e-6), ("5 \u00b5m", "mm", 5e-3), ("3 mm s^-1", "mm/s", 3),
     ("3 mm·s⁻¹", "mm/s", 3), ("3 mm s-1", "mm/s", 3), ("3 mm / s", "mm/s", 3), ("3\u00a0mm/s", "mm/s", 3),
     ("3\tmm/s", "mm/s", 3), ("3\u202fmm", "mm", 3), ("−3 mm", "mm", -3), ("50°", "degree", 50), ("+5 mm", "mm", 5)])
@@ -59,7 +60,9 @@ def test_quantities(text: str, unit: str, value: float) -> None:
     ("5 mm^99", "mm", "'5 mm^99'"), ("1e9999 mm", "mm", "1e9999"), ("5 mm; import os", "mm", "import"),
     ("1,5 mm", "mm", "decimals stand after a point"), ("1.000,5 mm", "mm", "decimals"), ("-1,000 mm", "mm", "decimals"),
     ("1,5", "", "decimals"), ("1 J/m s", "MPa", "may be read in two ways"), ("5 m2", "mm", "[length] ** 2"),
-    ("5 mm²", "mm", "[length] ** 2"), ("5 Mpa", "MPa", "capitals count: MPa"), ("1e3x10^3 mm", "mm", "1e3x10^3"),
+    ("5 mm²", "mm", "[length] ** 2"), ("5 Mpa", "MPa", "capitals count: MPa"),
+    ("5 mPa", "MPa", "mPa is a thousandth of a pascal: write MPa"),
+    ("5 mPa/s", "MPa/s", "write MPa"), ("1e3x10^3 mm", "mm", "1e3x10^3"),
     ("5 N-mm", "mm", "N-mm"), ("1 (m", "mm", "1 (m"), ("5 mm ^2", "mm", "5 mm ^2"), ("5 °C", "mm", "expected [length]"),
     ("5 degC", "mm", "expected [length]"), ("9" * 500, "mm", "99")])
 def test_what_is_no_quantity(text: str, unit: str, said: str) -> None:
@@ -116,7 +119,9 @@ def test_a_mesh_file_is_sought_from_the_folder_of_the_deck(tmp_path: Path) -> No
     ("case = 5", "case must be a name"), ('case = "nothing"', "case must be one of"), ("", "case must be a name"),
     ('case = "simple_shear"\nmesh = "M4"', "unknown key 'mesh'; the keys are case, p"), ("case = ", "is no deck"),
     ('case = "simple_shear"\n[parameters]\nsides = 5', "'sides' is no parameter"),
-    ('case = "simple_shear"\n[parameters]\nout = "/etc"', "'out' is no parameter"),
+    ('case = "simple_shear"\n[parameters]\nout = "/etc"', "'out' is no parameter; `skfsink"),
+    ('case = "simple_shear"\n[parameters]\nlengthscale = 1', "'lengthscale' is no parameter; 'length_scale' is one"),
+    ('case = "simple_shear"\n[parameters]\nEvent-time = 1', "parameter; 'event_time' is one"),
     ('case = "simple_shear"\n[parameters]\nside = [5]', "side must be a number, or text with a unit such as '1.5 mm'"),
     ('case = "simple_shear"\n[parameters]\nside = true', "side must be a number"),
     ('case = "simple_shear"\n[parameters]\nside = "5 s"', "expected [length]"),

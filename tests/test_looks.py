@@ -191,6 +191,8 @@ def test_an_interrupted_run_draws_what_it_has(tmp_path: Path) -> None:
         run(asked, tmp_path / "run", [Stop(60)], quiet=True)
     names = {path.name for path in (tmp_path / "run").iterdir()}
     assert {"density.svg", "speed.svg", "W.svg", "loading.svg", "energies.svg", "tip.svg", "animation.gif"} <= names
+    assert Image.open(skfsink.load(tmp_path / "run").plot(tmp_path / "a.png")).format == "PNG"  # whatever the others
+    assert "speed.png" not in names
     text = (tmp_path / "run" / "density.svg").read_text()
     assert "last frame" in text and "<!-- end" not in text
     assert not (tmp_path / "run" / "summary.json").exists()

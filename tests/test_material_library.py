@@ -127,6 +127,15 @@ def test_shear_moduli_in_closed_form():
     assert m.shear_modulus == pytest.approx(0.00764 + 0.9966 * 0.322**2 * np.sin(np.radians(99.96)) ** 2, rel=1e-12)
 
 
+@pytest.mark.parametrize(("whole", "broken"), [
+    (AAA(c1=1, c2=2, bulk_modulus=500), AAA(c1=1.0, c2=2.0)), (NeoHookean(mu=np.int64(3)), NeoHookean(mu=3.0)),
+    (Gent(mu=1, limit=50), Gent(mu=1.0, limit=50.0))])
+def test_constants_may_be_whole_numbers(whole: Material, broken: Material):
+    """Fails if constants without a decimal point, as people write them, are not taken as numbers of the same value."""
+    assert whole == broken and whole.constants.dtype == float
+    np.testing.assert_array_equal(whole.isochoric(np.array([3.5]))[0], broken.isochoric(np.array([3.5]))[0])
+
+
 # --- limits of the laws ---
 @pytest.mark.parametrize(("material", "same"), [
     (MooneyRivlin(c1=0.617, c2=0.0), NeoHookean()),

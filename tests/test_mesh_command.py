@@ -588,6 +588,18 @@ def test_a_size_that_a_run_refuses(scale: float, said: str, tmp_path: Path) -> N
     assert (status, err) == (0, "") and "a run refuses" not in out
 
 
+def test_sides_that_a_run_refuses(tmp_path: Path) -> None:
+    """Fails if the command is silent on elements that do not match, on which a run then ends."""
+    points = np.array([[0, 0, 0], [2, 0, 0], [2, 1, 0], [0, 1, 0], [1, 1, 0], [0, 2, 0], [1, 2, 0], [2, 2, 0.0]])
+    quads = np.array([[0, 1, 2, 3], [3, 4, 6, 5], [4, 2, 7, 6]])
+    meshio.Mesh(points, [("quad", quads)]).write(tmp_path / "in.vtu")
+    status, err, out = invoke_program("mesh", tmp_path / "in.vtu", tmp_path / "out.vtu", "--length-scale", "1")
+    assert (status, err) == (0, "") and "a run refuses this: mesh in: 1 node(s) lie in sides of elements" in out
+    assert "such as (1, 1) mm" in out
+    with pytest.raises(MeshError, match=r"1 node.s. lie in sides"):
+        file_sample(tmp_path / "out.vtu")
+
+
 def test_planes_of_names_that_are_taken(tmp_path: Path) -> None:
     """Fails if a form of a boundary that cannot be read is."""
     write_mesh(tmp_path / "in.vtu", plate(5))

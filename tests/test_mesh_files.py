@@ -421,9 +421,10 @@ def _newline(mesh: meshio.Mesh) -> None:
 
 
 @pytest.mark.parametrize("change, part", [
-    (_twice, "1 element(s) more than once"),
+    (_twice, "1 element(s) more than once, such as one near ("),
     (_corner_twice, "element 4 is inverted or degenerate: it has a node twice"),
-    (_bent, "plane of constant z"), (_upright, "plane of constant z"), (_small, "mm across"), (_large, "mm across"),
+    (_bent, "plane of constant z"), (_upright, "plane of constant z; they lie at one y: turn the mesh"),
+    (_small, "mm across"), (_large, "mm across"),
     (_lines_beyond, "nodes that do not exist")])
 def test_bodies_that_cannot_be(change: Callable[[meshio.Mesh], None], part: str, tmp_path: Path) -> None:
     """Fails if a mesh is computed on that counts an element twice, is flattened without a word, or overflows."""

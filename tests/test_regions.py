@@ -36,6 +36,7 @@ from skfsink.methods.statics import Statics
 from skfsink.run.display import Display
 from skfsink.run.observers.range import check_pressure, check_scene
 from skfsink.run.simulate import Simulation
+from skfsink.scene.fibres import with_fibres
 from skfsink.scene.scene import Scene
 
 STIFF, SOFT = NeoHookean(bulk_modulus=800.0, mu=4.0, density=2500.0), NeoHookean(bulk_modulus=40.0, mu=0.5)
@@ -464,6 +465,15 @@ def test_regions_that_are_refused(regions: list[tuple[str, list[int], SinkLaw]],
         dataclasses.replace(scene(), regions=tuple(
             Region(name, np.array(elements), AAA(), law) for name, elements, law in regions))
     assert "\n" not in str(error.value)
+
+
+def test_a_region_given_twice_is_refused() -> None:
+    """Fails if one of two tables of a region is taken in silence."""
+    twice = [Region("a", np.array([3]), AAA(), LAW), Region("b", np.array([4]), AAA(), LAW),
+             Region("a", np.array([3]), SOFT, LAW)]
+    with pytest.raises(ParameterError, match="region a is there twice: leave one out"):
+        with_fibres((), scene().sample, AAA(), twice, False)
+    assert with_fibres((), scene().sample, AAA(), twice[:2], False)[1] == tuple(twice[:2])
 
 
 def test_a_body_may_be_covered_by_its_regions() -> None:

@@ -78,6 +78,14 @@ def test_a_limit_in_the_loading_ends_it(mesh: Path, tmp_path: Path) -> None:
         assert "the loading ended because it was to stop" in part.verdict
 
 
+def test_an_event_may_end_before_its_first_step(mesh: Path, tmp_path: Path) -> None:
+    """Fails if a run whose condition holds as its event begins, here since a loading from rest goes past it, does not
+    end as others do."""
+    result = ran(mesh, tmp_path / "out", start="rest", speed="1000 mm/s", stop="displacement > 0.05 mm")
+    assert result.summary["end"] == "it was to stop at displacement > 0.05 mm" and result.state.step == 0
+    assert result.history["grip_displacement_mm"][-1] > 0.05 and (tmp_path / "out" / "checkpoint.npz").exists()
+
+
 def test_a_function_ends_a_run_and_can_say_why(mesh: Path, tmp_path: Path) -> None:
     """Fails if a function is not asked, is asked between records, or the folder claims to describe its run."""
     asked: list[float] = []

@@ -505,6 +505,8 @@ def test_a_browser_follows_a_run(copy: Path, browser: Any, width: int) -> None:
         until(page, "document.querySelector('img[data-picture^=energies]').src.endsWith('v=2')")
         page.wait_for_timeout(300)
         assert abs(page.evaluate("document.getElementById('energies').getBoundingClientRect().top") - place) < 3
+        for tag in ("h1", "p", "figcaption"):  # of a title and a path without a space
+            page.evaluate(f"document.querySelector('{tag}').textContent = 'title/'.repeat(50)")
         assert page.evaluate("document.documentElement.scrollWidth - window.innerWidth") <= 0
         (copy / HOLDER).unlink(), (copy / STATUS).unlink()
         until(page, "document.querySelector('.state').textContent == 'interrupted'")

@@ -82,6 +82,7 @@ def _report(source: Path, out: Path, made: meshio.Mesh, sample: Sample, length: 
     from ..meshing.files.pieces import check_one_piece
     from ..meshing.files.quality import Quality
     from ..meshing.files.split import counted
+    from ..meshing.files.unmatched import check_sides, slit_note
     from ..run.checks import check_size
 
     space, console = sample.space, Console(highlight=False, soft_wrap=True)
@@ -91,12 +92,12 @@ def _report(source: Path, out: Path, made: meshio.Mesh, sample: Sample, length: 
     for name, text in (("elements", counted(made)), ("nodes", f"{space.n_nodes}"), ("extent", f"{extent} mm"),
                        (size, f"{space.V.sum():.6g} mm^{space.dim}"),
                        ("boundaries", _sets(sample.boundaries, "nodes")), ("regions", _sets(sample.cells, "elements")),
-                       *(("note", note) for note in sample.notes)):
+                       *(("note", note) for note in (*sample.notes, *filter(None, [slit_note(space)])))):
         console.print(f"{name:12}{text}", markup=False)
     quality = Quality.of(space)
     flat = int(np.count_nonzero(quality.jacobian <= 0))
     warnings = [f"{flat} element(s) have a corner of 180 degrees or more"] if flat else []
-    for check in (lambda: check_one_piece(sample.name, str(source), space),
+    for check in (lambda: check_one_piece(sample.name, str(source), space), lambda: check_sides(sample.name, space),
                   lambda: check_size(space, length, of_metres="give --from m", of_micrometres="give --from um")):
         try:
             check()

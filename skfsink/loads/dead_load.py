@@ -24,8 +24,8 @@ class DeadLoad(NodalLoads):
     A traction acts on the facets of the surface all of whose nodes belong to its boundary. The facets of an element
     that has lost its force, at all its Gauss points, bear no load any more.
 
-    Memory: the load time last given to `at` and the elements last given to `keep`; `resultant` and energies are of the
-    loads as these left them.
+    Memory: the load time last given to `at` and the elements last given to `keep`; `resultant`, `idle` and energies
+    are of the loads as these left them.
 
     Parameters
     ----------
@@ -104,6 +104,12 @@ class DeadLoad(NodalLoads):
         """Force of one of the tractions now, (dim,) [N; N/mm in 2D]; along r of a body of revolution its sum around."""
         total: np.ndarray = self._areas[number].sum() * self.traction(self._time)[number]
         return total
+
+    def idle(self, free: np.ndarray) -> list[tuple[int, int]]:
+        """Numbers and axes of the components that strain nothing, as all nodes they act on are held; `free` (n, dim).
+        """
+        return [(number, axis) for number, rate in enumerate(self._rates) for axis, value in enumerate(rate)
+                if (isinstance(value, Ramp) or value) and not free[self.nodes[self._areas[number] > 0.0], axis].any()]
 
     def mean(self, number: int, u: np.ndarray) -> np.ndarray:
         """Mean of `u` (n, dim) over the boundary of one of the tractions, (dim,), while it is whole."""

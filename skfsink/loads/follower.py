@@ -33,8 +33,8 @@ class FollowerLoads:
     Memory: the load time last given to `at`; the facets that bear load, of the density last given to `keep`; the
     displacement last given to `add_force` or `size`, at which the volume below a facet that fails is kept; what `hold`
     has added to fluids; in a part of a body, its space last given to `on`. `of_part`, `check_closed`, `pressures`,
-    `work`, `add_stiffness`, `skew`, `stiffening`, `stiffest`, `swept`, `area` and `nodes` are for these; `memory` gives
-    what a checkpoint needs, and `restore` takes it up.
+    `work`, `add_stiffness`, `skew`, `stiffening`, `stiffest`, `swept`, `area`, `idle` and `nodes` are for these;
+    `memory` gives what a checkpoint needs, and `restore` takes it up.
 
     Parameters
     ----------
@@ -145,6 +145,20 @@ class FollowerLoads:
         add_pressure(self._wet.corner, self.pressures(u)[self._wet.owner], self._wet.X + u[self._wet.nodes], part,
                      self.space.axisymmetric)
         out[self._wet.nodes] += part
+
+    def idle(self, free: np.ndarray) -> list[int]:
+        """Numbers of the loads that strain nothing: where they push, all nodes are held, and no crack is to be theirs.
+
+        `free` (n, dim) is of the degrees of freedom.
+        """
+        found, alone = [], np.eye(len(self.loads))
+        for number, load in enumerate(self.loads):
+            force = np.zeros_like(self._wet.X)
+            add_pressure(self._wet.corner, alone[number][self._wet.owner], self._wet.X, force, self.space.axisymmetric)
+            moves = float(np.abs(force[free[self._wet.nodes]]).max(initial=0.0))
+            if moves <= 1e-9 * float(np.abs(force).max()) and not (isinstance(load, Pressure) and load.in_crack):
+                found.append(number)
+        return found
 
     def size(self, u: np.ndarray) -> float:
         """Norm of the nodal forces at `u` [N; N/mm in 2D]."""

@@ -10,7 +10,7 @@ with `J` replaced by its element mean in the volumetric part (Eq. 12, 13; see :m
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -49,6 +49,9 @@ class Material:
     viscosity: float = field(default=0.0, kw_only=True)
 
     def __post_init__(self) -> None:
+        for name in (one.name for one in fields(self) if one.type in (float, "float")):
+            if isinstance(value := getattr(self, name), int | np.number):  # whole numbers: the loops take floats alone
+                object.__setattr__(self, name, float(value))
         require("bulk_modulus", self.bulk_modulus, "MPa", low=0, low_open=True)
         require("density", self.density, "kg/m^3", low=0, low_open=True)
         require("viscosity", self.viscosity, "MPa s", low=0)

@@ -20,7 +20,7 @@ import numpy as np
 from ..errors import MeshError, SkfsinkError
 from .files.bounds import LARGEST
 from .files.orientation import oriented
-from .files.tidy import tidied
+from .files.tidy import place, tidied
 from .kept_mesh import SUFFIX, read_kept
 from .vtu import read_mesh
 
@@ -108,16 +108,22 @@ def check_mesh(name: str, mesh: meshio.Mesh) -> None:
     if not EXTENT[0] <= 2 * max(extents[:2]) <= EXTENT[1]:
         raise MeshError(f"mesh {name} must be {EXTENT[0]:g} to {EXTENT[1]:g} mm across; got {2 * max(extents[:2]):g}")
     if kind == "quad" and extents[2] > 1e-6 * max(extents[:2]):
-        raise MeshError(f"mesh {name} must have its quadrilaterals in a plane of constant z; "
-                        f"they reach over {2 * extents[2]:g} mm")
+        flat = next((axis for axis, extent in zip("xy", extents) if extent <= 1e-6 * max(extents)), "")
+        cure = f"they lie at one {flat}: turn the mesh, so that its coordinates are x and y" if flat else \
+            f"they reach over {2 * extents[2]:g} mm: lay it flat, or save the solid elements"
+        raise MeshError(f"mesh {name} must have its quadrilaterals in a plane of constant z; {cure}")
     nodes = np.sort(mesh.cells_dict[kind].astype(np.int64), axis=1)
     if (twice := (nodes[:, 1:] == nodes[:, :-1]).any(axis=1)).any():
         raise MeshError(f"mesh {name}: element {int(twice.argmax())} is inverted or degenerate: it has a node twice; "
                         f"if that is how your program writes triangles or wedges, convert it with skfsink mesh {name} "
                         f"OUT.vtu")
     rows = np.ascontiguousarray(nodes).view(np.dtype((np.void, nodes.itemsize * nodes.shape[1]))).ravel()
-    if (again := len(rows) - len(np.unique(rows))):
-        raise MeshError(f"mesh {name} has {again} element(s) more than once")
+    kept = np.unique(rows, return_index=True)[1]
+    if len(kept) < len(rows):
+        first = np.setdiff1d(np.arange(len(rows)), kept)[0]
+        middle = place(points[nodes[first]].mean(axis=0)[:2 if kind == "quad" else 3])
+        raise MeshError(f"mesh {name} has {len(rows) - len(kept)} element(s) more than once, such as one near "
+                        f"{middle} mm: leave the copies out")
 
 
 def check_indices(name: str, mesh: meshio.Mesh) -> None:

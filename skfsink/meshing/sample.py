@@ -20,6 +20,7 @@ from ..system.shipped import data_folder
 from .files.pieces import check_one_piece, hinges, merged
 from .files.split import counted, needs_split
 from .files.tidy import notes_of, place
+from .files.unmatched import check_sides, slit_note
 from .kept_mesh import SUFFIX
 from .mesh_file import check_mesh, one_line, quietly, read_mesh_file
 from .reused import reusable
@@ -46,6 +47,7 @@ class Sample:
     notes: what was done to the mesh of a file while it was read, one line each.
     made: whether the mesh was made by gmsh, and is not a file of the user's or a committed one.
     source: path of the file of the user's that it was read from first; "" for other meshes.
+    element: what the elements of a file of Abaqus are by their type, "planestress" or "axisymmetric"; "" if open.
     vectors: arrays of vectors of the file by name, at the elements (ne, 3): those of points are averaged, whatever
         their sign.
     """
@@ -57,6 +59,7 @@ class Sample:
     cells: Mapping[str, np.ndarray] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     source: str = ""
+    element: str = ""
     vectors: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     def revolved(self) -> Sample:
@@ -236,6 +239,9 @@ def _from_file(path: Path, merge_nodes: float = 0.0, option: bool = False) -> Sa
         check_mesh(name, merged(name, data, merge_nodes))
     sample = _from_meshio(str(path), data, source=str(path))
     check_one_piece(sample.name, shlex.quote(name), sample.space, option)
+    check_sides(sample.name, sample.space)
+    if slit := slit_note(sample.space):
+        sample = replace(sample, notes=(*sample.notes, slit))
     if len(nodes := hinges(sample.space)):
         what = "node" if sample.space.dim == 2 else "node or edge"
         note = (f"parts of the body hang together by a single {what}, at {len(nodes)} node(s), such as "
@@ -273,6 +279,7 @@ def _from_meshio(name: str, data: meshio.Mesh, made: bool = False, source: str =
         raise MeshError(f"mesh {shown}: {error}") from None
     return Sample(info.get("name") or Path(name).stem, space, _boundaries(data, facet), info.get("made", made),
                   cells=_elements(data, kind), notes=notes_of(data), source=info.get("source", source),
+                  element=info.get("element", ""),
                   vectors=_vectors(data, kind, space.conn))
 
 

@@ -193,11 +193,11 @@ class StepLength:
     # --- checkpoints ---
     def memory(self) -> dict[str, Any]:
         """What a checkpoint needs."""
-        assert self.mode is not None
-        return {"mode": self.mode, **{name: np.array(getattr(self, name)) for name in self.kept}}
+        mode = np.zeros(0) if self.mode is None else self.mode  # none before the first step
+        return {"mode": mode, **{name: np.array(getattr(self, name)) for name in self.kept}}
 
     def restore(self, memory: dict[str, np.ndarray]) -> None:
         """Go on where :meth:`memory` was taken."""
-        self.mode = memory["mode"]
+        self.mode = memory["mode"] if memory["mode"].size else None
         for name in self.kept:
             setattr(self, name, memory[name].item())

@@ -58,7 +58,7 @@ def draw_run(scene: Scene, folder: Path, series: str, moments: Mapping[str, int]
     history = History.load(folder / "history.csv")
     keys = run.keys()
     frames = run.frames(keys, run.cells)
-    density_picture(scene.space, frames, run.path("density"), run.title, scene.view)
+    _draw_density(run, frames)
     for name in (*(() if quasistatic else ("speed",)), *run.asked):
         field_picture(scene.space, frames, name, run.path(name), run.title, scene.view)
     loading_picture(way_to_onset(folder), run.path("loading"), run.title, _event(history))
@@ -138,11 +138,18 @@ def _draw_loading(run: _Files) -> None:
     """`density`, `loading`, fields and `animation.gif` of a run that did not fail."""
     scene = run.scene
     frames = run.frames(sorted({len(run.stored) // 2, len(run.stored) - 1}), run.cells)
-    density_picture(scene.space, frames, run.path("density"), run.title, scene.view)
+    _draw_density(run, frames)
     for name in run.asked:
         field_picture(scene.space, frames, name, run.path(name), run.title, scene.view)
     loading_picture(way_to_onset(run.folder), run.path("loading"), run.title)
     animation(scene.space, run.frames(few(len(run.stored))), run.folder / "animation.gif", view=scene.view)
+
+
+def _draw_density(run: _Files, frames: Sequence[Frame]) -> None:
+    """`density`, the main picture of a run: in the format that its scene says, and as PNG, which runs show of
+    themselves."""
+    for path in dict.fromkeys((run.path("density"), run.folder / "density.png")):
+        density_picture(run.scene.space, frames, path, run.title, run.scene.view)
 
 
 def _draw_probes(run: _Files) -> None:
@@ -204,10 +211,10 @@ def _density(scene: Scene, run: Run, path: Path, title: str) -> None:
 
 
 def draw_comparison(dynamic: Result, quasistatic: Result, folder: Path) -> None:
-    """`comparison`: the dynamic crack beside the quasi-static one, at the end of each."""
+    """`comparison`: the dynamic crack beside the quasi-static one, at the end of each; as PNG in any case."""
     scene = dynamic.scene
-    _comparison(scene, dynamic, quasistatic, folder / f"comparison.{scene.controls.pictures}",
-                f"{scene.title}, mesh {scene.sample.name}")
+    for path in dict.fromkeys((folder / f"comparison.{scene.controls.pictures}", folder / "comparison.png")):
+        _comparison(scene, dynamic, quasistatic, path, f"{scene.title}, mesh {scene.sample.name}")
 
 
 def _comparison(scene: Scene, dynamic: Run, quasistatic: Run, path: Path, title: str) -> None:

@@ -14,11 +14,14 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import ParameterError
+from ..errors import ParameterError, place_text
 from ..fem import indicators
+from ..fem.facets import boundary_facets
 from ..fem.space import Space
 from ..loads.rigid import free_motions, moves_as_a_whole, pieces
 from ..loads.schedule import Loading
+from ..material import MATERIALS, limiter_of
+from ..material.constants import FROM_SHEAR
 from ..material.regions import Region
 from ..scene.scene import Scene
 
@@ -33,6 +36,7 @@ LARGEST_H = 100.0          # smallest element, in l, above which a mesh is refus
 DENSITY = 1e-3, 10.0, 25e3, 1e6    # kg/m^3: foams have 10 and more, osmium 22,600; t/mm^3 and g/cm^3 give less
 WAVES = 0.1, 6000.0, 2e4           # shear waves [m/s]: gels have 1, rubbers 20, steel 3200, diamond 12,000
 STRENGTH = 1e-10, 1e-5, 1e3, 1e6   # Phi/mu: glass has 1e-6, stretched rubbers 60 to 240
+OTHER = 0.2                        # change of the shear modulus by which a default limiter is another material's
 COMPRESSIBLE = 2.0 / 3.0           # k/mu below which Poisson's ratio is negative
 # --- the grips ---
 PIECES = 100                # of a mesh, joined at single nodes; more are elements that nothing joins
@@ -119,7 +123,7 @@ def refuse(scene: Scene) -> None:
     ParameterError
         A body smaller than l, or elements of many l; a density or wave speed of no solid; a strength of none; grips
         faster than waves before a static onset; more steps or frames than can be made; a body, or a piece of one,
-        that nothing holds or nothing strains.
+        that nothing holds or nothing strains; a traction or pressure that grips take up.
     """
     space = scene.sample.space
     check_size(space, scene.sink_law.length_scale)
@@ -128,6 +132,7 @@ def refuse(scene: Scene) -> None:
     loading = scene.loading()
     if _dynamic(scene):
         _refuse_events(scene, loading)
+    _refuse_idle(scene, loading)
     label = pieces(space)
     count = int(label.max()) + 1
     if count > PIECES:
@@ -142,12 +147,25 @@ def refuse(scene: Scene) -> None:
         raise ParameterError("nothing loads the body: all its grips, tractions and pressures are still; give one of "
                              "them a velocity (a rate), or a ramp that rises")
     if not (scene.tractions or scene.pressures or scene.velocities) and moves_as_a_whole(space, loading, label):
-        whole = "the body" if count == 1 else f"each of the {count} pieces of the body, which are not joined,"
+        whole = "the body" if count == 1 else f"each of the {count} pieces of the body, which share no side,"
         raise ParameterError(f"the grips move {whole} as a whole and strain nothing: hold another boundary in the "
                              f"direction of the one that moves{', or merge nodes that coincide' if count > 1 else ''}")
 
 
 METRES = "multiply those of a mesh in m by 1000 (skfsink mesh IN OUT --from m)"
+
+
+def _refuse_idle(scene: Scene, loading: Loading) -> None:
+    """Refuse tractions and pressures that act on held nodes alone, and would strain nothing."""
+    free = loading.free.reshape(scene.sample.space.X.shape)
+    if loading.tractions is not None and (idle := loading.tractions.idle(free)):
+        boundary, axis = scene.tractions[idle[0][0]].boundary, "xyz"[idle[0][1]]
+        raise ParameterError(f"the traction on {boundary} acts along {axis}, which grips hold at all of its nodes, and "
+                             f"strains nothing: leave {axis} out of the grip, or of the traction")
+    if loading.followers is not None and (useless := loading.followers.idle(free)):
+        boundary = scene.pressures[useless[0]].boundary
+        raise ParameterError(f"the pressure on {boundary} acts where grips hold all of its nodes against it, and "
+                             f"strains nothing: end the grip short of {boundary}, or leave the pressure out")
 
 
 def check_size(space: Space, length_scale: float, *, of_metres: str = METRES,
@@ -232,6 +250,11 @@ def warn(scene: Scene, folder: Path) -> None:
                     "length_scale", size, size / l, l, LEAST_BODY[1])
     for part in scene.parts:
         _warn_of_material(scene, part)
+    if (meant := scene.sample.element) and meant != scene.controls.element:
+        what = "plane stress" if meant == "planestress" else "a body of revolution"
+        log.warning("the mesh file has elements of %s, and the run takes element = '%s'%s: take element = '%s', or go "
+                    "on if it is meant", what, scene.controls.element,
+                    ", in plane strain" if scene.controls.element in ("jbar", "plain") else "", meant)
     loading = scene.loading()
     motions = [motion for motion in free_motions(space, loading.free, sliding=loading.sliding) if not motion.unheld]
     if motions:
@@ -239,6 +262,13 @@ def warn(scene: Scene, folder: Path) -> None:
                     "show; %s", ", and ".join(f"{m.piece} free to {m.name}" for m in motions[:3]),
                     f", and {len(motions) - 3} more motions" if len(motions) > 3 else "",
                     "; ".join(dict.fromkeys(m.cure for m in motions)))
+    for kind, load in (*(("traction", load) for load in scene.tractions), *(("pressure", p) for p in scene.pressures)):
+        nodes = scene.sample.nodes(load.boundary)
+        bare = np.setdiff1d(nodes, space.mesh.facets[:, boundary_facets(space, nodes)])
+        if bare.size:
+            log.warning("the %s on %s acts on a part of it: %d of its %d nodes are on no side of the surface that has "
+                        "all its nodes in it, such as the one at %s mm", kind, load.boundary, bare.size, nodes.size,
+                        place_text(space.X[bare[0]]))
     if _dynamic(scene):
         _warn_of_events(scene, loading, folder)
     elif _is_viscous(scene):
@@ -259,6 +289,14 @@ def _warn_of_material(scene: Scene, part: Region) -> None:
         log.warning("the energy limiter phi = %.3g MPa is %.2g of the shear modulus %.3g MPa (outside of %g to %g)%s: "
                     "it fails at strains of about %.2g; check the units of both (MPa)", phi, ratio,
                     material.shear_modulus, *STRENGTH[1:3], where, np.sqrt(2 * ratio))
+    law = next((name for name in FROM_SHEAR if type(material) is MATERIALS[name]), "")  # of isotropic laws
+    given = any(table["name"] == part.name and "phi" in table for table in scene.parameters.get("regions", ()))
+    if law and phi == limiter_of(law).phi and not given:
+        usual = MATERIALS[law]().shear_modulus
+        if abs(material.shear_modulus / usual - 1) > OTHER:
+            log.warning("phi = %.4g MPa belongs to %s with its default constants, of shear modulus %.3g MPa, and here "
+                        "that is %.3g MPa%s: give the phi of this material, or its strength is that of the other one",
+                        phi, law, usual, material.shear_modulus, where)
     if stiff < COMPRESSIBLE:
         log.warning("k/mu = %.3g is so small (below %.2g)%s that Poisson's ratio is negative; check the units of "
                     "bulk_modulus (MPa) and of the constants", stiff, COMPRESSIBLE, where)

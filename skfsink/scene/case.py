@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import difflib
 import inspect
 import typing
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -127,8 +128,8 @@ class Case:
 
     @cached_property
     def _record(self) -> Record:
-        return Record({name: parameter.annotation for name, parameter in self.parameters.items()
-                       if not parameter.has_tables}, _message)
+        known = {name: parameter.annotation for name, parameter in self.parameters.items() if not parameter.has_tables}
+        return Record(known, partial(_message, tuple(known)))
 
     def read(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Values of parameters from a deck: text with a unit becomes a number in the unit of the parameter.
@@ -170,9 +171,11 @@ class Case:
         return {name: {**self.newer, **arguments}[name] for name in self.default_arguments}, values
 
 
-def _message(mistake: Mistake, values: Mapping[str, Any]) -> str:
+def _message(known: Sequence[str], mistake: Mistake, values: Mapping[str, Any]) -> str:
     if mistake.unknown:
-        return f"{mistake.field!r} is no parameter; `skfsink show CASE` lists them"
+        near = difflib.get_close_matches(mistake.field[:60].lower().replace("-", "_"), known, 1, 0.75)
+        return (f"{mistake.field!r} is no parameter; {f'{near[0]!r} is one, and ' if near else ''}`skfsink show CASE` "
+                f"lists them")
     if mistake.field == "mesh" and isinstance(mistake.value, str):
         return mistake.text + r": for \ in a path write /, or put the path in single quotes"
     return mistake.text

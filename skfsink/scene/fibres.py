@@ -42,10 +42,14 @@ def with_fibres(tables: Any, sample: Sample, material: Material, regions: Sequen
     Raises
     ------
     ParameterError
-        A region is not there, has no fibres or gets them twice; directions are missing, or there are none somewhere;
-        the deck directs the fibres of some parts of the body, and nothing those of another.
+        A region is there twice, or not there, has no fibres or gets them twice; directions are missing, or there are
+        none somewhere; the deck directs the fibres of some parts of the body, and nothing those of another.
     """
     found, seen = {region.name: region for region in regions}, set[str]()
+    if len(found) < len(regions):
+        names = [region.name for region in regions]
+        raise ParameterError(f"region {next(name for name in names if names.count(name) > 1)} is there twice: leave "
+                             f"one out")
     given = {table.get("region", ""): table for table in read_tables("fibres", tables)}
     alike = [name for name, region in found.items()
              if "" in given and name not in given and region.material == material]

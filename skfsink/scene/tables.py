@@ -140,6 +140,9 @@ def _one_kind(table: Mapping[str, Any]) -> None:
     if "normal" in table and (others or "angle" in table):
         raise ParameterError(f"grip {name} has normal and {[*others, 'angle'][0]}: a boundary that slides is held "
                              f"along its normal alone; hold other components by a second grip on it")
+    if len(table) == 1:
+        raise ParameterError(f"grip {name} holds nothing: give it x, y, z, normal or angle; a component that is left "
+                             f"out is free")
     if "angle" in table and others:
         raise ParameterError(f"grip {name} has angle and {others[0]}: a boundary that turns is held in all directions")
     if ("angle" in table) != ("centre" in table) or ("axis" in table and "angle" not in table):

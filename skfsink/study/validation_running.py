@@ -177,8 +177,8 @@ def _early_run(state: str, groups: dict[float, dict[float, dict[str, Any]]]) -> 
         if len(ratios) > 1:
             found[height] = float(np.mean(ratios))
     last = list(found.values())[-1] if found else np.nan
-    return Row(f"strips, {state}: $WH(1-v/c_R)$ over $D$ per length, of cracks that no wave from the grips has reached, "
-               f"{', '.join(f'{h:g}' for h in found) or 'no'} mm high", "1 (Freund; Goldman et al. 2010)",
+    return Row(f"strips, {state}: $WH(1-v/c_R)$ over $D$ per length, of cracks that no wave from the grips has "
+               f"reached, {', '.join(f'{h:g}' for h in found) or 'no'} mm high", "1 (Freund; Goldman et al. 2010)",
                ", ".join(f"{ratio:.2f}" for ratio in found.values()) or "–", "–", bool(abs(last - 1) < SAME) if found
                else None, "means; nearer to 1 the more lengths $l$ a strip is high" if len(found) > 1 else "means")
 

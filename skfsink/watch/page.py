@@ -44,9 +44,9 @@ class Entry:
 
     @property
     def what(self) -> str:
-        """Case, mesh and analysis."""
+        """Case, mesh and analysis; of a mesh file its name, without the folders."""
         run = self.seen.run
-        return "" if run is None else f"{run.title}, mesh {run.parameters.get('mesh', EMPTY)}, {kind(run)}"
+        return "" if run is None else f"{run.title}, mesh {Path(run.parameters.get('mesh', EMPTY)).name}, {kind(run)}"
 
     @property
     def phase(self) -> str:

@@ -170,6 +170,13 @@ class Cells:
             self.notes.append(f"shells and membranes ({listed(shells)}) are taken as plane elements, whose thickness "
                               "and plane stress or strain a deck decides")
 
+    def _element(self) -> str:
+        """The `element` of a deck that all plane elements are of, "" if they leave it open."""
+        kinds = [group.kind for group, _, nodes in self.body.blocks
+                 if len(nodes) and not self.solid and base_of(group.cell) in ("quad", "triangle")]
+        return next((element for element, form in (("planestress", PLANE_STRESS), ("axisymmetric", REVOLVED))
+                     if kinds and all(map(form.match, kinds))), "")
+
     def mesh(self, names: dict[str, Names]) -> meshio.Mesh:
         """The mesh with the sets and surfaces of the model."""
         sets = {}
@@ -189,7 +196,8 @@ class Cells:
         cell_sets = {name: [members.get(i, none) for i in range(len(cells))] for name, members in sets.items()}
         mesh = meshio.Mesh(self.body.points, cells, cell_sets=cell_sets, point_sets=points)
         found = dict.fromkeys((*self.notes, *self.body.notes))
-        mesh.info = {"notes": [note if note.isprintable() else ascii(note)[1:-1] for note in found]}
+        mesh.info = {"notes": [note if note.isprintable() else ascii(note)[1:-1] for note in found],
+                     "element": self._element()}
         return mesh
 
     def _members(self, elements: np.ndarray) -> dict[int, np.ndarray]:

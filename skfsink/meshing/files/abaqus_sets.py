@@ -197,7 +197,7 @@ class Body:
         return found
 
     def _faces(self, members: np.ndarray, entry: Entry, name: str, faces_are_cells: bool) -> Iterable[np.ndarray]:
-        face, used = entry.face, 0
+        face, used, inside = entry.face, 0, 0
         for group, at, nodes in self.blocks:
             mine = members[(members >= at) & (members < at + len(nodes))] - at
             base = base_of(group.cell)
@@ -215,11 +215,16 @@ class Body:
                     yield nodes[mine][:, form][free[k][at + mine]]
             elif face[:1] in ("S", "E") and face[1:].isdecimal() and 1 <= int(face[1:3]) <= len(forms) and (
                     face[0] == "S" or len(forms[0]) == 2):
-                yield nodes[mine][:, forms[int(face[1:3]) - 1]]
+                k = int(face[1:3]) - 1
+                inside += int(np.count_nonzero(~self.free[k][at + mine]))
+                yield nodes[mine][:, forms[k]]
             else:
                 raise entry.block.error(f"elements of type {group.kind} have no face {face[:10]!r}, which the surface "
                                         f"{name[:60]!r} names", entry.line)
             used += len(mine)
+        if inside:
+            self.notes.append(f"the surface {name[:60]!r} ({entry.block.where}) has {inside} face(s) {face} inside of "
+                              "the body, between two elements: look whether another side of them is meant")
         if used < len(members):
             self.notes.append(f"the surface {name[:60]!r} ({entry.block.where}) has {len(members) - used} element(s) "
                               "that are no body, and is without these")
