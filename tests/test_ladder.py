@@ -157,6 +157,19 @@ def test_a_start_from_rest_goes_on_where_it_was_stopped(tmp_path: Path) -> None:
     assert files[0] == files[1]
 
 
+def test_small_elements_are_not_shaken_at_a_start_from_rest(tmp_path: Path) -> None:
+    """Fails if rounding of the first forces, over the small masses at a resolved notch, sets the body in motion.
+
+    The nodes then moved at 700 times the speed of the grips after one step, and the event began far below the onset.
+    """
+    scene = with_options("symmetric_double_edge_notch", start="rest")
+    run = Simulation(scene, tmp_path, Display(quiet=True), observers=[Stop(4)])
+    with pytest.raises(Interrupted):
+        run.run()
+    assert run.state.phase == "loading" and run.state.step == 4
+    assert float(np.abs(run.state.v).max()) < 5 * scene.loading().speed(0.0)
+
+
 @pytest.mark.slow
 def test_a_start_from_rest_comes_to_the_static_onset_in_motion(tmp_path: Path) -> None:
     """Fails if the loading from rest stops early, lets the body crack on its way, or hands over a body at rest.
