@@ -27,7 +27,8 @@ from skfsink.sweep.one import run_folder
 from skfsink.system import shipped
 from skfsink.system.shipped import data_folder, deck_name, deck_path, description, shipped_decks
 
-DECKS = ("aneurysm", "biaxial_hole", "branching_plate", "centre_crack", "fibre_plate", "penny_crack", "pure_shear")
+DECKS = ("aneurysm", "biaxial_hole", "branching_plate", "centre_crack", "fibre_plate", "penny_crack", "pure_shear",
+         "thick_strip")
 
 
 def beside(name: str, script: str) -> ModuleType:
