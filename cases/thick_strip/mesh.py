@@ -24,7 +24,8 @@ def strip(h: float) -> meshio.Mesh:
     points = np.stack([axis.ravel() for axis in np.meshgrid(z, y, x, indexing="ij")][::-1], axis=-1)
     face = [(slice(None, -1), slice(None, -1)), (slice(None, -1), slice(1, None)),
             (slice(1, None), slice(1, None)), (slice(1, None), slice(None, -1))]
-    cells = np.stack([number[(part, *corner)] for part in (slice(None, -1), slice(1, None)) for corner in face], axis=-1)
+    below_above = slice(None, -1), slice(1, None)
+    cells = np.stack([number[(layer, *corner)] for layer in below_above for corner in face], axis=-1)
     sets = {"bottom": number[:, 0].ravel(), "top": number[:, -1].ravel()}
     return meshio.Mesh(points, [("hexahedron", cells.reshape(-1, 8))], point_sets=sets)
 
