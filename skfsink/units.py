@@ -13,8 +13,9 @@ from typing import Annotated, Any, get_args, get_origin
 
 from .errors import ParameterError
 
-__all__ = ["Unit", "in_unit", "kind_and_unit", "number_in"]
+__all__ = ["MMHG", "Unit", "in_unit", "kind_and_unit", "number_in"]
 
+MMHG = 7500.6157584566  #: mmHg in a MPa
 LONGEST = 80  # characters of a quantity
 #: characters as they are typeset, and as they are typed
 TYPED = str.maketrans({"\u03bc": "µ", "−": "-", "–": "-", "·": "*", "⋅": "*", "×": "*", "°": "degree",

@@ -39,14 +39,7 @@ def outer_faces(space: Space, planes: Sequence[np.ndarray] = (), gone: np.ndarra
     planes: nodes of each plane of symmetry: faces in it are none of the surface, since the body goes on behind them.
     gone: numbers of elements that the body lacks; the faces of others that met them are of its surface.
     """
-    mask = space.outer_faces.copy()
-    if gone is not None and gone.size:
-        here = np.ones(space.n_elements, bool)
-        here[gone] = False
-        faces = np.stack([node_key(space.conn[:, corners], space.n_nodes) for corners in space.face_corners], axis=1)
-        _, index, count = np.unique(faces[here], return_inverse=True, return_counts=True)
-        mask[here] = (count == 1)[index].reshape(faces[here].shape)
-        mask[gone] = False
+    mask = space.outer_faces.copy() if gone is None or not gone.size else space.faces_without(gone)
     for plane in planes:
         on = np.zeros(space.n_nodes, bool)
         on[plane] = True

@@ -118,12 +118,15 @@ class RegionLaw:
     density: Annotated[float, Unit("kg/m^3")] = 0.0
     viscosity: Annotated[float, Unit("MPa s")] = 0.0
 
+    def __post_init__(self) -> None:
+        if self.constants and not self.material:
+            raise ParameterError(f"region {self.name}: constants {self.constants!r} are those of no law: give a "
+                                 f"material as well")
+
     def laws(self, material: Material, sink_law: SinkLaw) -> tuple[Material, SinkLaw]:
         """Material and sink law of the region, in a body of these."""
         try:
             if not self.material:
-                if self.constants:
-                    raise ParameterError(f"constants {self.constants!r} are those of no law: give a material as well")
                 given = {"bulk_modulus": self.bulk_modulus, "density": self.density, "viscosity": self.viscosity}
                 law = replace(material, **{name: value for name, value in given.items() if value})
                 return law, replace(sink_law, phi=self.phi or sink_law.phi, m=self.m or sink_law.m)

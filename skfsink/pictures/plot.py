@@ -25,8 +25,8 @@ from ..fields.energy import OPTIONAL_TERMS
 from ..results.frame import Frame
 from ..results.history import Table, history_units
 from ..results.loading import has_pressure, pressure_alone
-from ..results.tables import MMHG
 from ..system.files import replaced
+from ..units import MMHG
 from . import body as deformed
 from .body import OBLIQUE, Body, View
 

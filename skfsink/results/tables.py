@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..units import MMHG
 from .energies import ENERGIES
 from .history import onset_load
 
@@ -20,7 +21,6 @@ __all__ = ["EMPTY", "Row", "Table", "cost_table", "energy_tables", "key_table", 
            "version_table"]
 
 EMPTY = "–"
-MMHG = 7500.6157584566  # mmHg in a MPa
 
 
 @dataclass(frozen=True)

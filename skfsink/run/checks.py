@@ -32,10 +32,6 @@ LARGEST_H = 100.0          # smallest element, in l, above which a mesh is refus
 PIECES = 100                # of a mesh, joined at single nodes; more are elements that nothing joins
 
 
-def _dynamic(scene: Scene) -> bool:
-    return scene.controls.analysis != "quasistatic"
-
-
 # --- what cannot be meant ---
 def refuse(scene: Scene) -> None:
     """Refuse a scene whose figures cannot be meant.
@@ -52,7 +48,7 @@ def refuse(scene: Scene) -> None:
     for part in scene.parts:
         refuse_material(scene, part)
     loading = scene.loading()
-    if _dynamic(scene):
+    if scene.controls.dynamic:
         refuse_events(scene, loading)
     _refuse_idle(scene, loading)
     label = pieces(space)
@@ -136,7 +132,7 @@ def warn(scene: Scene, folder: Path) -> None:
             log.warning("the %s on %s acts on a part of it: %d of its %d nodes are on no side of the surface that has "
                         "all its nodes in it, such as the one at %s mm", kind, load.boundary, bare.size, nodes.size,
                         place_text(space.X[bare[0]]))
-    if _dynamic(scene):
+    if scene.controls.dynamic:
         warn_of_events(scene, loading, folder)
     elif _is_viscous(scene):
         log.warning("viscosity has no effect in a quasi-static analysis, which has no velocities: take "

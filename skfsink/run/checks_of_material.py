@@ -31,7 +31,7 @@ def refuse_material(scene: Scene, part: Region) -> None:
         raise ParameterError(f"the energy limiter phi = {phi:.3g} MPa{where} is {ratio:.2g} of the shear modulus "
                              f"{material.shear_modulus:.3g} MPa (allowed {STRENGTH[0]:g} to {STRENGTH[3]:g}): both are "
                              f"in MPa; a number in Pa is to be divided by 1e6")
-    if not _dynamic(scene):
+    if not scene.controls.dynamic:
         return
     if not DENSITY[0] <= material.density <= DENSITY[3]:
         raise ParameterError(f"density {material.density:.4g} kg/m^3{where} is that of no solid (allowed "
@@ -62,7 +62,7 @@ def warn_of_material(scene: Scene, part: Region) -> None:
     if stiff < COMPRESSIBLE:
         log.warning("k/mu = %.3g is so small (below %.2g)%s that Poisson's ratio is negative; check the units of "
                     "bulk_modulus (MPa) and of the constants", stiff, COMPRESSIBLE, where)
-    if not _dynamic(scene):
+    if not scene.controls.dynamic:
         return
     if not DENSITY[1] <= material.density <= DENSITY[2]:
         log.warning("density %.4g kg/m^3 is unusual for a solid (outside of %g to %g)%s: %s", material.density,
@@ -83,7 +83,3 @@ def _density_cure(density: float) -> str:
 def _where(scene: Scene, part: Region) -> str:
     """Of which material a message speaks, if there are several."""
     return "" if len(scene.parts) == 1 else f" of region {part.name}" if part.name else " outside of the regions"
-
-
-def _dynamic(scene: Scene) -> bool:
-    return scene.controls.analysis != "quasistatic"

@@ -92,6 +92,11 @@ class Controls:
     hht: HHTControls = field(default_factory=HHTControls)
     statics: StaticsControls = field(default_factory=StaticsControls)
 
+    @property
+    def dynamic(self) -> bool:
+        """Whether there is an event in time, alone or beside a quasi-static one."""
+        return self.analysis != "quasistatic"
+
     def __post_init__(self) -> None:
         choose("analysis", self.analysis, ANALYSES)
         choose("integrator", self.integrator, INTEGRATORS)

@@ -23,6 +23,7 @@ import tomli_w
 from ..errors import ParameterError, first_line
 from ..system.files import path_of
 from ..system.text import read_toml
+from .case import Case
 from .options import Options
 from .registry import CASES, find_case
 from .scene import Scene
@@ -82,10 +83,7 @@ class Deck:
         if unknown := [name for name in parameters if name not in case.parameters]:
             raise ParameterError(f"{unknown[0]!r} is no parameter of {self.case}; `skfsink show {self.case}` lists "
                                  f"them, and a run takes {', '.join(OUTPUT)} besides")
-        functions = {name: value for name, value in parameters.items() if name == "stop" and callable(value)}
-        named = {name: str(value) if isinstance(value, Path) else value for name, value in parameters.items()
-                 if name not in functions}
-        return replace(self, parameters={**self.parameters, **case.read(named), **functions})
+        return replace(self, parameters={**self.parameters, **_read(case, parameters)})
 
     def check(self) -> tuple[dict[str, Any], Options]:
         """The arguments of the case function, those of the sample and the options; the latter are checked.
@@ -96,14 +94,20 @@ class Deck:
             There is no such case, no such parameter, or it has no such value.
         """
         case = find_case(self.case)
-        named = {name: str(value) if isinstance(value, Path) else value for name, value in self.parameters.items()}
-        functions = {name: named.pop(name) for name in ("stop",) if callable(named.get(name))}
-        arguments, values = case.divide({**case.read(named), **functions})
+        arguments, values = case.divide(_read(case, self.parameters))
         return arguments, replace(Options(), **values, given_names=frozenset(self.parameters))
 
     def toml(self) -> str:
         """Its text."""
         return tomli_w.dumps({"case": self.case, **tables_beside(self.parameters)})
+
+
+def _read(case: Case, parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """Values of parameters as :meth:`.Case.read` gives them; a path is text, and a function as `stop` is kept."""
+    functions = {name: value for name, value in parameters.items() if name == "stop" and callable(value)}
+    named = {name: str(value) if isinstance(value, Path) else value for name, value in parameters.items()
+             if name not in functions}
+    return {**case.read(named), **functions}
 
 
 def read_deck(path: str | Path) -> Deck:

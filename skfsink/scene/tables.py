@@ -167,9 +167,6 @@ def _with_constants(table: Mapping[str, Any]) -> dict[str, Any]:
     """The table of a region, with the constants that E, G and nu stand for."""
     law = RegionLaw(**table)
     if not law.material:
-        if law.constants:
-            raise ParameterError(f"region {law.name}: constants {law.constants!r} are those of no law: give a material "
-                                 f"as well")
         return _table(law)
     if law.material not in MATERIALS:
         raise ParameterError(f"region {law.name}: material must be one of {', '.join(MATERIALS)}; got {law.material!r}")

@@ -40,7 +40,7 @@ def tangent_general(space: Space, pattern: Pattern, material: GeneralMaterial, u
     x, law = space.X + u, material.compiled_law.address
     loop = _tangent_around if space.axisymmetric else _tangent_2d if space.dim == 2 else _tangent_3d
     solid = Solid(material.bulk_modulus, material.shear_modulus, j_bar, convex)
-    pieces = Pieces(space, pattern, np.ascontiguousarray(gamma), elements, fibres)
+    pieces = Pieces(space, pattern, gamma, elements, fibres)
     return pieces.assemble(lambda piece, data: loop(law, material.constants, solid, x, piece, data), threads)
 
 

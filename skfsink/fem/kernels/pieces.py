@@ -80,8 +80,9 @@ class Pieces:
 
 
 def _taken(array: np.ndarray, rows: np.ndarray | slice) -> np.ndarray:
-    """Rows of an array, read-only if it is: the compiled loops are not compiled again for them."""
-    taken: np.ndarray = array[rows]
+    """Rows of an array, one after the other in memory and read-only if it is: the compiled loops are not compiled again
+    for them."""
+    taken: np.ndarray = np.ascontiguousarray(array[rows])
     taken.flags.writeable = array.flags.writeable
     return taken
 

@@ -159,7 +159,7 @@ def tangent_plane_stress(space: Space, pattern: Pattern, material: Material, u: 
     """
     x, law = space.X + u, material.compiled_law.address
     solid = Solid(material.bulk_modulus, material.shear_modulus, False, convex)
-    pieces = Pieces(space, pattern, np.ascontiguousarray(gamma), elements)
+    pieces = Pieces(space, pattern, gamma, elements)
     return pieces.assemble(lambda piece, data: _tangent(law, material.constants, solid, x, piece, data), threads)
 
 

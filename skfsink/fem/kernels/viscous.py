@@ -244,7 +244,7 @@ def viscous_tangent(space: Space, pattern: Pattern, viscous: Viscous, motion: tu
     """
     u, v = motion
     loop = _tangent_around if space.axisymmetric else _tangent_2d if space.dim == 2 else _tangent_3d
-    pieces = Pieces(space, pattern, np.ascontiguousarray(gamma), elements)
+    pieces = Pieces(space, pattern, gamma, elements)
     return pieces.assemble(lambda piece, data: loop(viscous, compression, (space.X + u, v), piece, data), threads)
 
 

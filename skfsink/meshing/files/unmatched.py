@@ -88,7 +88,6 @@ def _nodes_on(space: Space, sides: _Sides) -> tuple[np.ndarray, np.ndarray]:
     within = NEAR * sides.size[side]
     own = np.linalg.norm(corner[side] - X[node][:, None], axis=2).min(axis=1) <= within
     side, node, within = side[~own], node[~own], within[~own]
-    on = np.ones(len(side), bool)
     if space.dim == 2:
         a, b = corner[side, 0], corner[side, 1]
         along, to = b - a, X[node] - a

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...errors import ParameterError
+from ...fem.indicators import outer_faces
 from ...fem.space import Space
 from ...fields.release_rate import area_vectors
 from ...scene.scene import Scene
@@ -26,10 +27,8 @@ def notch_tip(space: Space, node: int, within: float, left_out: Sequence[np.ndar
     normals (axes) of planes of symmetry that the notch is cut by: there is as much of it behind. `gone` are the numbers
     of elements that the body has not, as those of an initial crack. None where no surface is within three elements.
     """
-    element, face = np.nonzero(space.outer_faces if gone is None or not gone.size else space.faces_without(gone))
+    element, face = np.nonzero(outer_faces(space, left_out, gone))
     nodes = space.conn[element[:, None], space.face_corners[face]]
-    real = ~np.any([np.zeros(len(nodes), bool), *(np.isin(nodes, some).all(axis=1) for some in left_out)], axis=0)
-    element, nodes = element[real], nodes[real]
     surface = np.unique(nodes)
     if not surface.size:
         return None

@@ -20,8 +20,8 @@ from ...fields.density import DensitySolver
 from ...fields.state import State
 from ...loads.grips import Grip, Ramp, Sliding
 from ...loads.sliding import normal_of
-from ...results.tables import MMHG
 from ...scene.scene import Scene
+from ...units import MMHG
 
 __all__ = ["beginning", "check_arrival", "check_beginning", "greatest_ratio", "onset_text", "rim_of", "symmetry_planes"]
 

@@ -58,7 +58,7 @@ def check_scene(scene: Scene) -> None:
                     "of the mesh, on which onset and U depend; round it with at least 4 elements", angle,
                     place_text(place), SHARP)
     c = scene.controls
-    if c.analysis != "quasistatic" and c.integrator == "explicit":
+    if c.dynamic and c.integrator == "explicit":
         _check_widths(space, c.explicit.raised_mass)
 
 
