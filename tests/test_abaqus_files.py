@@ -693,7 +693,7 @@ def test_what_is_not_read_is_named(tmp_path: Path) -> None:
         (PLATE + "5, 1, 2, 5, 4, 3\n", "line 16: element 5 has 5 nodes"),
         (PLATE + "5, 1, 2, 5, 99\n", "line 11: element 5 has the node 99, which does not exist"),
         (PLATE + "5, 1, 2, x, 4\n", "line 16: 'x' is no whole number"),
-        (PLATE + "1, 1, 2, 5, 4\n", "element 1 is given twice"),
+        (PLATE + "1, 1, 2, 5, 4\n", "element 1 is given twice: delete one of its lines"),
         (PLATE + "5, 1, 2, 99999999999999999999, 4\n", "line 16:"),
         (PLATE + "*PARAMETER\na = 1\n", "*PARAMETER is not read"),
         (PLATE + "*ELEMENT, TYPE=U1\n7, 1, 2\n*USER ELEMENT, TYPE=U1, NODES=x\n", "number of NODES"),

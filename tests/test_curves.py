@@ -383,7 +383,7 @@ def test_points_of_a_deck_in_a_file(tmp_path: Path) -> None:
     ("0, 0\n1, nan", r"grip top, y: line 2 of .*pull\.csv must be a finite number"),
     ("0, 0", r"grip top, y: a ramp must have at least two points"),
     ("0, 0\n" * 1001, r"grip top, y: .*pull\.csv has more than 1000 points"),
-    (None, r"grip top, y: cannot read the points of .*pull\.csv: .*No such file")])
+    (None, r"grip top, y: there is no file .*pull\.csv of its points; a path in a deck counts from the folder")])
 def test_files_that_hold_no_points(text: str | None, message: str, tmp_path: Path) -> None:
     """Fails if a file is misread, or its mistake is not named by its line."""
     if text is not None:

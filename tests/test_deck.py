@@ -115,6 +115,21 @@ def test_a_mesh_file_is_sought_from_the_folder_of_the_deck(tmp_path: Path) -> No
     assert parameters(tmp_path, 'mesh = "coarse"')["mesh"] == "coarse"
 
 
+def test_a_path_from_the_home_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fails if `~` is taken for a folder of that name beside the deck, in a path of a mesh or of points."""
+    for variable in ("HOME", "USERPROFILE"):
+        monkeypatch.setenv(variable, str(tmp_path / "home"))
+    (tmp_path / "home").mkdir()
+    assert parameters(tmp_path, 'mesh = "~/plate.vtu"')["mesh"] == str(tmp_path / "home" / "plate.vtu")
+    (tmp_path / "home" / "pull.csv").write_text("0, 0\n1, 2 mm\n")
+    write_mesh(tmp_path / "plate.vtu", plate())
+    grips = '[[grips]]\nboundary = "top"\ny = "~/pull.csv"\n'
+    path = deck(tmp_path, f"case = 'custom'\n[parameters]\nmesh = 'plate.vtu'\n{grips}")
+    assert read_deck(path).parameters["grips"][0]["y"] == [[0.0, 0.0], [1.0, 2.0]]
+    with pytest.raises(ParameterError, match=r"mesh: the home folder in '~nobody-here/x\.vtu' is not known: give"):
+        parameters(tmp_path, 'mesh = "~nobody-here/x.vtu"')
+
+
 @pytest.mark.parametrize(("text", "said"), [
     ("case = 5", "case must be a name"), ('case = "nothing"', "case must be one of"), ("", "case must be a name"),
     ('case = "simple_shear"\nmesh = "M4"', "unknown key 'mesh'; the keys are case, p"), ("case = ", "is no deck"),

@@ -36,6 +36,7 @@ from ..scene.tables import (
     tractions_of,
     velocities_of,
 )
+from ..system.files import path_of
 from ..units import Unit
 
 __all__ = ["custom"]
@@ -155,7 +156,7 @@ def _scene(arguments: dict[str, Any], options: Options) -> Scene:
         if getattr(options, name) != getattr(Options, name):
             raise ParameterError(f"{name} is for the cases of the paper; the mesh file {arguments['mesh']} is taken "
                                  f"unchanged")
-    sample = file_sample(Path(arguments["mesh"]), arguments.get("merge_nodes", 0.0))
+    sample = file_sample(path_of("mesh", arguments["mesh"]), arguments.get("merge_nodes", 0.0))
     material, sink_law = options.stored_energy(), options.sink_law()
     regions = tuple(Region(law.name, sample.elements(law.name), *law.laws(material, sink_law))
                     for law in regions_of(arguments["regions"]))

@@ -16,6 +16,7 @@ from skfem.io.meshio import INV_HEX_MAPPING
 
 from ..errors import MeshError, ParameterError, require
 from ..fem.space import Space
+from ..system.files import path_of
 from ..system.shipped import data_folder
 from .files.pieces import check_one_piece, hinges, merged
 from .files.split import counted, needs_split
@@ -140,7 +141,7 @@ def load_sample(case: str, mesh: str, make: Callable[[], meshio.Mesh] | None = N
         return _from_meshio(mesh, lift(quietly(lambda: read_mesh(path), f"the mesh file {path} cannot be read")))
     if not Path(mesh).suffix:
         raise MeshError(f"mesh must be one of {', '.join(known)}, or the path of a mesh file; got {mesh!r}")
-    return _from_file(Path(mesh))
+    return _from_file(path_of("mesh", mesh))
 
 
 @reusable

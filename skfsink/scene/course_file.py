@@ -26,6 +26,9 @@ def read_course(path: Path, unit: str, most: int) -> list[list[float]]:
     points: list[list[float]] = []
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except FileNotFoundError:
+        raise ParameterError(f": there is no file {path} of its points; a path in a deck counts from the folder of the "
+                             f"deck") from None
     except (OSError, ValueError) as error:
         raise ParameterError(f": cannot read the points of {path}: {first_line(error)}") from None
     for number, row in enumerate(csv.reader(lines), 1):

@@ -132,7 +132,8 @@ def read_deck(path: str | Path) -> Deck:
     except ParameterError as error:
         raise ParameterError(f"{path}: {error}") from None
     if Path(mesh := deck.parameters.get("mesh", "")).suffix:
-        return replace(deck, parameters={**deck.parameters, "mesh": str((path.parent / mesh).absolute())})
+        mesh = str((path.parent / path_of("mesh", mesh)).absolute())
+        return replace(deck, parameters={**deck.parameters, "mesh": mesh})
     return deck
 
 

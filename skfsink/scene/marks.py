@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from numbers import Real
-from pathlib import Path
 from typing import Any
 
 from ..errors import ParameterError, require
 from ..loads.curve import Curve
 from ..loads.grips import Ramp
+from ..system.files import path_of
 from ..units import number_in
 from .course_file import SUFFIX, read_course
 
@@ -37,7 +37,7 @@ class Course:
             raise ParameterError(" takes no function of the time, as x, y and z of grips and tractions do: give a ramp "
                                  "of points [time, value]")
         if isinstance(value, str) and value.lower().endswith(SUFFIX):
-            value = read_course(Path(value), self.unit, MOST)
+            value = read_course(path_of("", value), self.unit, MOST)
         if not isinstance(value, list | tuple):
             return require("", number_in("", value, self.rate), self.rate)
         if len(value) > MOST or not all(isinstance(point, list | tuple) and len(point) == 2 for point in value):

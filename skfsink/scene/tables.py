@@ -31,6 +31,7 @@ from ..material import MATERIALS, own_constants
 from ..material.regions import RegionLaw, one_bulk_modulus
 from ..meshing.cracks import InitialCrack, crack_along, crack_of_elements, of_length
 from ..meshing.sample import Sample
+from ..system.files import path_of
 from ..units import Unit, kind_and_unit
 from .course_file import SUFFIX
 from .marks import MOST, Course, Direction, Place, PressureCourse, Still, Vector, Way, plain
@@ -210,7 +211,7 @@ def beside(tables: Any, folder: Path) -> Any:
 
     def path(key: str, value: Any) -> Any:
         named = key in (*AXES, "angle") and isinstance(value, str) and value.lower().endswith(SUFFIX)
-        return str((folder / value).absolute()) if named else value
+        return str((folder / path_of(key, value)).absolute()) if named else value
 
     return [{key: path(key, value) for key, value in table.items()} if isinstance(table, Mapping) else table
             for table in tables]

@@ -171,11 +171,12 @@ def draw(points: Points, path: Path) -> None:
             if name == "cost":
                 ax.axvline(1.0, color="0.4", linewidth=0.6)
             else:
-                ax.set_xscale("symlog", linthresh=0.01)
+                ax.set_xscale("symlog", linthresh=0.01, linscale=0.3)
                 shown = [v for row in rows for v in row[name]]
                 ticks = [t for t in (-0.1, 0.0, 0.1, 1.0) if min(shown) <= t <= max(shown)]
                 ax.set_xticks(ticks, [f"{100 * t:+g}" if t else "0" for t in ticks])
                 ax.minorticks_off()
+                ax.tick_params(axis="x", labelsize=6)
                 ax.axvline(0.0, color="0.4", linewidth=0.6)
                 noise = [row[name] for row in rows if row["group"] == "nothing"]
                 if noise:

@@ -16,16 +16,20 @@ HIDDEN = (".lock", ".running")  # files of the lock of a run; a folder that has 
 
 
 def path_of(name: str, value: object) -> Path:
-    """A path, of a Path or a text; `name` says in the error what it is of.
+    """A path, of a Path or a text, `~` for the home folder; `name` says in the error what it is of.
 
     Raises
     ------
     ParameterError
-        It is neither.
+        It is neither, or there is no such home folder.
     """
     if not isinstance(value, str | os.PathLike):
         raise ParameterError(f"{name} must be a path; got {value!r:.80}")
-    return Path(value)
+    try:
+        return Path(value).expanduser()
+    except RuntimeError:
+        raise ParameterError(f"{name}: the home folder in {os.fspath(value)!r:.80} is not known: give the whole path"
+                             ) from None
 
 
 @contextmanager

@@ -111,7 +111,8 @@ class Body:
             late = max(elements.order[again[0]:again[0] + 2])
             ends = np.cumsum([len(group.numbers) for group in part.elements])
             block = part.elements[int(np.searchsorted(ends, late, "right"))].block
-            raise block.error(f"element {elements.sorted[again[0]]} is given twice")
+            raise block.error(f"element {elements.sorted[again[0]]} is given twice: delete one of its lines, or "
+                              "number it anew")
         self.placed[name.lower()] = Placed(name, part, nodes, elements)
 
     def node_set(self, scope: Placed, name: str) -> np.ndarray:
