@@ -304,13 +304,18 @@ class Space:
 
     def faces_without(self, gone: np.ndarray) -> np.ndarray:
         """The same of the body without the elements `gone` (their numbers), which have no faces."""
-        faces = np.stack([node_key(self.conn[:, corners], self.n_nodes) for corners in self.face_corners], axis=1)
         there = np.ones(self.n_elements, bool)
         there[gone] = False
-        _, index, count = np.unique(faces[there], return_inverse=True, return_counts=True)
-        mask = np.zeros(faces.shape, bool)
-        mask[there] = (count == 1)[index].reshape(-1, faces.shape[1])
+        faces = self._faces[there]
+        mask = np.zeros(self._faces.shape, bool)
+        mask[there] = (np.bincount(faces.ravel()) == 1)[faces]
         return mask
+
+    @cached_property
+    def _faces(self) -> np.ndarray:
+        """Numbers of the faces of the elements, (ne, 2 dim): equal where elements share one."""
+        faces = np.stack([node_key(self.conn[:, corners], self.n_nodes) for corners in self.face_corners], axis=1)
+        return np.unique(faces, return_inverse=True)[1].reshape(faces.shape).astype(np.int32)
 
     @property
     def face_corners(self) -> np.ndarray:

@@ -23,6 +23,7 @@ LEAST_PIECE = 0.02  # of the body; smaller fragments do not widen the axes
 # nodes of an element are numbered lexicographically (see `space`); facets go round as seen from outside
 FACETS = {2: np.array([[0, 1], [1, 3], [3, 2], [2, 0]]),
            3: np.array([[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]])}
+_FACES = {2: [2, 1, 3, 0], 3: [0, 1, 2, 3, 4, 5]}  # their numbers in `Space.outer_faces`
 _LIGHT = np.array([-0.3, 0.4, 0.87])  # towards the light: right, up, out of the picture
 
 
@@ -44,12 +45,24 @@ def live_elements(space: Space, frame: Frame) -> tuple[np.ndarray, np.ndarray]:
     """
     holds = frame.gamma[space.conn] >= SPENT
     elements = np.flatnonzero(~frame.deleted & holds.any(axis=1))
-    X, u, holds = space.X[space.conn[elements]], frame.u[space.conn[elements]], holds[elements][:, :, None]
-    x = X + np.where(holds, u, np.sum(u, axis=1, where=holds, keepdims=True) / holds.sum(axis=1, keepdims=True))
+    x = (space.X + frame.u)[space.conn[elements]]
+    partly = np.flatnonzero(~holds[elements].all(axis=1))  # have a spent node
+    conn, held = space.conn[elements[partly]], holds[elements[partly]][:, :, None]
+    moved = np.sum(frame.u[conn], axis=1, where=held, keepdims=True) / held.sum(axis=1, keepdims=True)
+    x[partly] = space.X[conn] + np.where(held, frame.u[conn], moved)
+    if (frame.gamma[space.conn[elements]] >= CRACKED).all():  # nothing can be torn
+        return elements, x
+    X = space.X[space.conn[elements]]
     pairs = [(a, a | 1 << i) for i in range(space.dim) for a in range(2**space.dim) if not a >> i & 1]
-    stretch = [np.linalg.norm(x[:, a] - x[:, b], axis=1) / np.linalg.norm(X[:, a] - X[:, b], axis=1) for a, b in pairs]
+    stretch = [_lengths(x[:, a] - x[:, b]) / _lengths(X[:, a] - X[:, b]) for a, b in pairs]
     kept = ~_torn(space, elements, frame.gamma, np.max(stretch, axis=0))
     return elements[kept], x[kept]
+
+
+def _lengths(vectors: np.ndarray) -> np.ndarray:
+    """Of vectors (k, dim), (k,)."""
+    lengths: np.ndarray = np.sqrt(np.einsum("ki,ki->k", vectors, vectors))
+    return lengths
 
 
 def _torn(space: Space, elements: np.ndarray, gamma: np.ndarray, stretch: np.ndarray) -> np.ndarray:
@@ -89,8 +102,8 @@ def body(space: Space, frame: Frame, view: View, colour: np.ndarray | None = Non
         faces = np.dstack([x, gamma, np.ones_like(gamma), value])[:, [0, 1, 3, 2]]
         return Body(_triangles(faces), x[:, facets][edge], extent(space, elements, x, gamma))
     x = x @ turned(view).T
-    box, surface = extent(space, elements, x[:, :, :2], gamma), outer_facets(space, elements)
-    x, gamma, value = x[:, facets][surface], gamma[:, facets][surface], value[:, facets][surface]
+    box, (element, facet) = extent(space, elements, x[:, :, :2], gamma), np.nonzero(outer_facets(space, elements))
+    x, gamma, value = (values[element[:, None], facets[facet]] for values in (x, gamma, value))
     normal = np.cross(x[:, 2] - x[:, 0], x[:, 3] - x[:, 1])
     light = 0.65 + 0.35 * np.clip(normal @ _LIGHT / np.linalg.norm(normal, axis=1), 0, 1)
     faces = np.dstack([x[:, :, :2], gamma, np.broadcast_to(light[:, None], gamma.shape), value])
@@ -150,10 +163,9 @@ def _triangles(faces: np.ndarray) -> np.ndarray:
 
 def outer_facets(space: Space, elements: np.ndarray) -> np.ndarray:
     """Which facets of the elements, (nl, facets), are shared with no other of them."""
-    nodes = np.sort(space.conn[elements][:, FACETS[space.dim]], axis=2)
-    key = nodes[:, :, :space.dim] @ space.n_nodes ** np.arange(space.dim)  # as many nodes as tell facets apart
-    _, inverse, counts = np.unique(key, return_inverse=True, return_counts=True)
-    return np.asarray(counts[inverse] == 1).reshape(key.shape)
+    gone = np.ones(space.n_elements, bool)
+    gone[elements] = False
+    return space.faces_without(np.flatnonzero(gone))[elements][:, _FACES[space.dim]]
 
 
 def extent(space: Space, elements: np.ndarray, x: np.ndarray, gamma: np.ndarray) -> np.ndarray:
