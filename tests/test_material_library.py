@@ -335,13 +335,6 @@ def test_convex_tangent(material: GeneralMaterial):
         assert np.linalg.eigvalsh(exact)[0] < 0 < np.linalg.eigvalsh(convex)[0]
 
 
-def test_plane_stress_is_refused():
-    """Fails if a law of several invariants is used in loops that do not know it."""
-    said = r"element planestress is for laws of I1' alone; MooneyRivlin .* fit yeoh .* hexahedra"
-    with pytest.raises(ParameterError, match=said):
-        Momentum(box("quad", 2), MooneyRivlin(), "planestress")
-
-
 # --- names, constants, strengths ---
 def test_materials_by_name():
     """Fails if a name does not give its class and constants, has no limiter, or a wrong one is not told the others."""
