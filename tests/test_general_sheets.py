@@ -4,7 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bodies import box, close, distorted, ends, grid, grips, held_body, momentum_of, notched, patchy, wavy
+from bodies import (
+    box,
+    close,
+    distorted,
+    ends,
+    greatest_square,
+    grid,
+    grips,
+    held_body,
+    momentum_of,
+    notched,
+    patchy,
+    wavy,
+)
 from plates import plate
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
@@ -168,6 +181,25 @@ def test_without_the_second_invariant_it_is_the_neo_hookean_sheet():
         close(other.W, one.W, 1e-13)
         close(other.tangent(pattern, u), one.tangent(pattern, u), 1e-12)
         assert other.stiffest(u, inverse) == pytest.approx(one.stiffest(u, inverse), rel=1e-12)
+
+
+@all_laws
+def test_the_indicator_of_the_highest_frequency(material: GeneralMaterial):
+    """Fails if it is not the greatest quotient of an element, by the forms, or exceeds the highest frequency."""
+    space = box("quad", 5)
+    gamma = np.random.default_rng(3).uniform(0.05, 1, space.w.shape)
+    free = np.repeat(~ends(space)[0], 2)
+    pattern = Pattern(space, 2, free, upper=True)
+    for u in (space.X * 0.0, space.X * [-0.08, 0.2] + wavy(space, 0.1)):
+        momentum = sheet(space, material, gamma)
+        mass = momentum.lumped_mass(1e-3)
+        inverse = np.where(free.reshape(-1, 2), 1 / mass[:, None], 0.0)
+        found = momentum.stiffest(u, inverse)
+        forms = Momentum(space, material, "planestress", kernels="forms")
+        forms.backend.set_gamma(gamma)
+        assert found == pytest.approx(forms.stiffest(u, inverse), rel=1e-11)
+        assert 0.2 * greatest_square(momentum, pattern, free, u, mass) < found
+        assert found < greatest_square(momentum, pattern, free, u, mass)
 
 
 # --- derivatives ---
