@@ -28,6 +28,7 @@ from skfsink.fem.forms import plane_stress_forms
 from skfsink.fem.kernels import general_sheet
 from skfsink.fem.pattern import Pattern
 from skfsink.fem.space import Space
+from skfsink.fields import stress
 from skfsink.fields.configurational import point_stress
 from skfsink.fields.density import DensitySolver
 from skfsink.fields.energy import Ledger
@@ -45,6 +46,7 @@ from skfsink.material import (
     Ogden,
     SinkLaw,
 )
+from skfsink.material.oriented import AroundALine, oriented
 from skfsink.material.regions import Region
 from skfsink.material.sheet import SheetInvariants
 from skfsink.meshing.sample import _from_meshio
@@ -335,8 +337,8 @@ def test_stress_of_the_fields_gives_the_nodal_forces(material: GeneralMaterial):
     space = box("quad", 5)
     momentum, u = sheet(space, material, patchy(space)), wavy(space, 0.15)
     force = momentum.force(u)
-    stress = cauchy_stress(momentum, u)
-    assert abs(stress[:, 2]).max() < 1e-12 * material.bulk_modulus and abs(stress[:, 0]).max() > 0.1
+    sigma = cauchy_stress(momentum, u)
+    assert abs(sigma[:, 2]).max() < 1e-12 * material.bulk_modulus and abs(sigma[:, 0]).max() > 0.1
     every = np.arange(space.n_elements)
     found = point_stress(momentum, u, every, momentum.gamma)
     close(found.energy, momentum.gamma * momentum.W, 1e-11)
@@ -350,6 +352,28 @@ def test_stress_of_the_fields_gives_the_nodal_forces(material: GeneralMaterial):
     C = cauchy_stress(sheet(space, material), homogeneous)[0]
     sigma = material.first_piola(F) @ F.T / np.linalg.det(F)
     np.testing.assert_allclose(C, [sigma[0, 0], sigma[1, 1], 0.0, sigma[0, 1], 0.0, 0.0], atol=1e-12)
+
+
+def test_fibres_of_each_element():
+    """Fails if stress, stretches or configurational forces take the fibres of another element than the loops do."""
+    space = box("quad", 5)
+    around = oriented(TISSUE, AroundALine(centre=(-0.5, -0.4, 0.0)))
+    momentum, u = sheet(space, around, patchy(space)), wavy(space, 0.15)
+    fibres = momentum.parts[0].fibres
+    assert np.ptp(fibres[:, 0, 0]) > 0.5 and not fibres[..., 2].any()
+    force, every = momentum.force(u), np.arange(space.n_elements)
+    s = stress._at_points(momentum, u, momentum.parts[0], slice(None), momentum.gamma)
+    assert abs(s[..., 2]).max() < 1e-12 * TISSUE.bulk_modulus
+    F = around.thin_sheet(np.eye(2) + space.gradient(u), fibres[:, None])
+    P = np.linalg.det(F)[..., None, None] * s[..., [[0, 3, 5], [3, 1, 4], [5, 4, 2]]] @ np.swapaxes(
+        np.linalg.inv(F), -1, -2)
+    for found in (P[..., :2, :2], point_stress(momentum, u, every, momentum.gamma).P):
+        local = np.zeros_like(u)
+        np.add.at(local, space.conn, np.einsum("eq,eqiJ,eqaJ->eai", space.w, found, space.dN))
+        close(local, force, 1e-11)
+    mean = np.eye(2) + np.einsum("eq,eqiJ->eiJ", space.w / space.V[:, None], space.gradient(u))
+    exact = np.linalg.svd(around.thin_sheet(mean, fibres))[1]
+    np.testing.assert_allclose(principal_stretches(momentum, u, every[::-2]), exact[::-2], rtol=1e-12)
 
 
 # --- bodies of several materials, threads, refusals ---
