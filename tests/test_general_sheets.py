@@ -357,7 +357,7 @@ def test_stress_of_the_fields_gives_the_nodal_forces(material: GeneralMaterial):
 def test_fibres_of_each_element():
     """Fails if stress, stretches or configurational forces take the fibres of another element than the loops do."""
     space = box("quad", 5)
-    around = oriented(TISSUE, AroundALine(centre=(-0.5, -0.4, 0.0)))
+    around = oriented(TISSUE, AroundALine(centre=(-0.5, -0.4, 0.0)), (0.0, 0.0, 1.0))
     momentum, u = sheet(space, around, patchy(space)), wavy(space, 0.15)
     fibres = momentum.parts[0].fibres
     assert np.ptp(fibres[:, 0, 0]) > 0.5 and not fibres[..., 2].any()
