@@ -83,9 +83,10 @@ def test_the_table_of_the_materials() -> None:
     assert [row[0].strip("`") for row in table] == [*MATERIALS]
     for row in table:
         kind = MATERIALS[row[0].strip("`")]
-        said = {name: float(number) for name, number in re.findall(r"`(\w+)`(?: \([^)]*\))? ([\d.]+\d)", row[-1])}
-        assert said == {f.name: f.default for f in fields(kind) if isinstance(f.default, float)
-                        and f.name not in ("bulk_modulus", "density", "viscosity")}, row[0]
+        listed = re.findall(r"`(\w+)`(?: \([^)]*\))? ([\d.]*\d(?:, −?[\d.]*\d)*)", row[-1])
+        said = {name: [float(number.replace("−", "-")) for number in numbers.split(", ")] for name, numbers in listed}
+        own = [f for f in fields(kind) if f.name not in ("bulk_modulus", "density", "viscosity", "axis", "normal")]
+        assert said == {f.name: list(f.default) if isinstance(f.default, tuple) else [f.default] for f in own}, row[0]
     for row in rows(page, "| name | the constants are those of |"):
         assert float(row[2].split(",")[0]) == LIMITERS[row[0].strip("`")].phi, row[0]
         assert f"$m$ = {LIMITERS[row[0].strip('`')].m:g}" in page

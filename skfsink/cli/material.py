@@ -22,7 +22,7 @@ def material(name: str, /, *, phi: float | None = None, m: float | None = None, 
     Parameters
     ----------
     name
-        aaa, neo-hookean, yeoh, mooney-rivlin, gent, arruda-boyce, or hgo.
+        aaa, neo-hookean, yeoh, mooney-rivlin, gent, arruda-boyce, ogden, or hgo.
     phi
         Energy limiter Phi [MPa]; by default the one that goes with the material's default constants.
     m
@@ -31,7 +31,8 @@ def material(name: str, /, *, phi: float | None = None, m: float | None = None, 
         Picture to write: a .png, .pdf or .svg file.
     constants
         Constants of the law by name, such as --mu 0.3 or --mu "300 kPa", or --E 0.9 --nu 0.499; vectors as --axis
-        1,0,0. A plain number is in the unit of the constant, MPa. An unknown one lists those there are.
+        1,0,0, or --mu 0.63,0.0012 --alpha 1.3,5. A plain number is in the unit of the constant, MPa. An unknown one
+        lists those there are.
     """
     from dataclasses import fields
 
@@ -100,7 +101,9 @@ def _value(name: str, text: Any) -> Any:
         numbers = tuple(float(part) for part in text.split(","))
     except ValueError:
         unit = UNITS.get(name, constant_unit(name))
-        return in_unit(name, text, unit) if unit else text
+        if not unit:
+            return text
+        numbers = tuple(in_unit(name, part.strip(), unit, plain="," in text) for part in text.split(","))
     return numbers[0] if len(numbers) == 1 else numbers
 
 

@@ -58,12 +58,15 @@ class CompiledMomentum:
 
     def _tangent(self, part: Part, pattern: Pattern, u: np.ndarray, gamma: np.ndarray, convex: bool) -> np.ndarray:
         material, elements, fibres = part
+        if isinstance(material, GeneralMaterial) and fibres is not None:
+            if self._plane_stress:
+                return kernels.tangent_general_sheet(self._space, pattern, material, u, gamma, fibres, convex=convex,
+                                                     elements=elements, threads=self.tiles.threads)
+            return kernels.tangent_general(self._space, pattern, material, u, gamma, fibres, j_bar=self._j_bar,
+                                           convex=convex, elements=elements, threads=self.tiles.threads)
         if self._plane_stress:
             return kernels.tangent_plane_stress(self._space, pattern, material, u, gamma, convex=convex,
                                                 elements=elements, threads=self.tiles.threads)
-        if isinstance(material, GeneralMaterial) and fibres is not None:
-            return kernels.tangent_general(self._space, pattern, material, u, gamma, fibres, j_bar=self._j_bar,
-                                           convex=convex, elements=elements, threads=self.tiles.threads)
         return kernels.tangent(self._space, pattern, material, u, gamma, j_bar=self._j_bar, convex=convex,
                                elements=elements, threads=self.tiles.threads)
 

@@ -29,6 +29,7 @@ from ..fem.backend import Part, among
 from ..material import GeneralMaterial, Material
 from ..material.crushed import J_FLOOR, crushed
 from ..material.general import cofactor
+from ..material.sheet import SheetInvariants
 from .momentum import Momentum
 
 __all__ = ["PointStress", "configurational_forces", "point_stress"]
@@ -104,7 +105,7 @@ def _of_part(momentum: Momentum, part: Part, own: np.ndarray, F: np.ndarray,
     """W of the undamaged material, P weighted by gamma, and p (J - J_bar), of elements by their numbers in one part."""
     material, w = part.material, momentum.space.w[part.numbers(own)]
     if momentum.plane_stress:
-        return _of_sheet(material, F, gamma)
+        return _of_sheet(material, F, gamma, None if part.fibres is None else part.fibres[own][:, None])
     cof = cofactor(F)
     J = np.einsum("...J,...J", F[..., 0, :], cof[..., 0, :])
     k, J_bar, gamma_bar = material.bulk_modulus, J, gamma
@@ -126,32 +127,48 @@ def _of_part(momentum: Momentum, part: Part, own: np.ndarray, F: np.ndarray,
     return W, P, p * (J - J_bar)
 
 
-def _of_sheet(material: Material, F: np.ndarray, gamma: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _of_sheet(material: Material, F: np.ndarray, gamma: np.ndarray,
+              fibres: np.ndarray | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The same of a thin sheet without stress across it; J below the floor is read as that (Sec. 4.1)."""
     F = np.where((gamma > 0)[..., None, None], F, np.eye(3))
     plane = F[..., :2, :2]
     j = np.maximum(plane[..., 0, 0] * plane[..., 1, 1] - plane[..., 0, 1] * plane[..., 1, 0], J_FLOOR)
-    t = np.einsum("...iJ,...iJ", plane, plane)
-    across = _across(material, t, j)
+    t, along = np.einsum("...iJ,...iJ", plane, plane), material.along(plane, fibres)
+    across = _across(material, t, j, along)
     J = j * across
-    psi, slope, _ = material.isochoric(J ** (-2 / 3) * (t + across**2))
     cof = cofactor(F)
-    P = (2 * gamma * slope * J ** (-2 / 3))[..., None, None] * (F - (across**2 / j)[..., None, None] * cof)
+    if isinstance(material, GeneralMaterial):
+        at = SheetInvariants(t, j, J, along)
+        psi, d, _ = material.isochoric(at.values)
+        slope = gamma * np.einsum("a...,ab...->b...", d, at.plane)
+        P = 2 * slope[0][..., None, None] * F + slope[1][..., None, None] * cof
+        if fibres is not None:
+            P += 2 * np.einsum("f...,...iJ,...fJ,...fK->...iK", slope[2:], F, fibres, fibres)
+    else:
+        psi, d, _ = material.isochoric(J ** (-2 / 3) * (t + across**2))
+        P = (2 * gamma * d * J ** (-2 / 3))[..., None, None] * (F - (across**2 / j)[..., None, None] * cof)
     return psi + 0.5 * material.bulk_modulus * (J - 1) ** 2, P, np.zeros_like(gamma)
 
 
-def _across(material: Material, t: np.ndarray, j: np.ndarray) -> np.ndarray:
+def _across(material: Material, t: np.ndarray, j: np.ndarray, along: np.ndarray) -> np.ndarray:
     """:meth:`.Material.stretch_across` by Newton's method for log J^(1/3) (Sec. 4.1), which is faster."""
     y, k = np.ones_like(j), material.bulk_modulus
     for _ in range(60):
-        J, p, s = y**3, t / y**2, (y * y / j) ** 2
-        _, slope, curve = material.isochoric(p + s)
-        lean = 4 * s - 2 * p
-        gradient = slope * lean + 3 * k * J * (J - 1)
-        isochoric = curve * lean**2 + slope * (16 * s + 4 * p)
+        J = y**3
+        if isinstance(material, GeneralMaterial):
+            at = SheetInvariants(t, j, J, along)
+            _, d, dd = material.isochoric(at.values)
+            slope = np.einsum("a...,a...", d, at.across)
+            isochoric = np.einsum("a...,a...", d, at.curved) + np.einsum("ab...,a...,b...", dd, at.across, at.across)
+        else:
+            p, s = t / y**2, (y * y / j) ** 2
+            _, d, dd = material.isochoric(p + s)
+            lean = 4 * s - 2 * p
+            slope, isochoric = d * lean, dd * lean**2 + d * (16 * s + 4 * p)
+        gradient = slope + 3 * k * J * (J - 1)
         stiff = np.maximum(isochoric + 3 * k * J * (6 * J - 3), 0.1 * (isochoric + 9 * k * J * J))
         step = np.clip(-gradient / stiff, -0.2, 0.2)
         y *= np.exp(step)
         if np.abs(step).max(initial=0.0) < 1e-9:
             return np.asarray(y**3 / j)
-    return material.stretch_across(t, j)
+    return material.stretch_across(t, j, along)

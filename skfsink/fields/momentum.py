@@ -24,6 +24,9 @@ from .energy import OPTIONAL_TERMS, Ledger
 __all__ = ["BulkViscosity", "Momentum", "Part", "terms_without"]
 
 
+FLAT = 1e-6  # degrees by which fibres may leave the plane of a sheet: rounding
+
+
 class Momentum:
     """Internal force and its derivatives (Eq. 14-19, 28) for the relative density last given.
 
@@ -114,12 +117,9 @@ class Momentum:
                 continue
             fibres = None
             if isinstance(material, GeneralMaterial):
-                if self.plane_stress:
-                    raise ParameterError("element planestress is for laws of I1' alone; "
-                                         f"{type(material).__name__} has more invariants: fit yeoh to the same curve, "
-                                         "or mesh the sheet with hexahedra between free faces; jbar is a thick plate, "
-                                         "up to a third stiffer in tension")
                 fibres = material.fibres(space.X[space.conn[elements]].mean(axis=1))
+                if self.plane_stress:
+                    _check_in_plane(fibres, type(material).__name__)
                 if space.axisymmetric:
                     _check_mirrored(fibres, type(material).__name__)
             parts.append(Part(material, elements if elements.size < space.n_elements else None, fibres))
@@ -332,6 +332,15 @@ class Momentum:
         if isinstance(self.rho0, np.ndarray):
             return self.backend.lump(gamma * self.rho0)
         return self.backend.lump(gamma) * self.rho0
+
+
+def _check_in_plane(fibres: np.ndarray, material: str) -> None:
+    """Refuse directions (ne, families, 3) out of a thin sheet: they would bear a shear stress on its free faces."""
+    steepest = float(np.degrees(np.arcsin(min(np.abs(fibres[..., 2]).max(initial=0.0), 1.0))))
+    if steepest > FLAT:
+        raise ParameterError("element planestress is for isotropic laws, and for fibres in the plane of the sheet; "
+                             f"those of {material} rise out of it by up to {steepest:.3g} degrees: let normal be along "
+                             "z, or mesh the sheet with hexahedra between free faces")
 
 
 def _check_mirrored(fibres: np.ndarray, material: str) -> None:

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import ParameterError
+from ..fem.backend import among
 from ..fem.places import Places
 from .momentum import Momentum
 from .state import State
@@ -78,9 +79,8 @@ def principal_stretches(momentum: Momentum, u: np.ndarray, elements: np.ndarray)
     upright = np.linalg.det(F) > 0.0
     F[~upright] = np.eye(3)
     if momentum.plane_stress:
-        for part in momentum.parts:
-            here = slice(None) if part.elements is None else np.isin(elements, part.elements)
-            F[here] = part.material.thin_sheet(F[here][:, :2, :2])
+        for part, here, own in among(momentum.parts, elements):
+            F[here] = part.material.thin_sheet(F[here][:, :2, :2], None if part.fibres is None else part.fibres[own])
     stretches = np.sqrt(np.linalg.eigvalsh(np.swapaxes(F, -1, -2) @ F))[:, ::-1]
     stretches[~upright] = np.nan
     return stretches

@@ -57,7 +57,7 @@ def _at_points(momentum: Momentum, u: np.ndarray, part: Part, rows: slice | np.n
     flat = raw < J_FLOOR
     F[flat] = np.eye(3)  # as good as any for points without stiffness; those with it are marked as unknown
     if momentum.plane_stress:
-        F = material.thin_sheet(F[..., :2, :2])
+        F = material.thin_sheet(F[..., :2, :2], None if part.fibres is None else part.fibres[rows][:, None])
     J_bar = J = _determinant(F)
     gamma_bar = gamma
     if momentum.j_bar:

@@ -26,9 +26,10 @@ from .fibres import HolzapfelGasserOgden
 from .general import GeneralMaterial, MooneyRivlin
 from .isotropic import AAA, ArrudaBoyce, Gent, NeoHookean, Yeoh
 from .library import LIMITERS, MATERIALS, Limiter, limiter_of, material_from
+from .ogden import Ogden
 from .sink import SinkLaw
 
 __all__ = ["AAA", "GENERAL_LAW", "LAW", "LIMITERS", "MATERIALS", "MODULI", "ArrudaBoyce", "CompiledLaw",
            "GeneralMaterial", "Gent", "HolzapfelGasserOgden", "Limiter", "Material", "MooneyRivlin", "NeoHookean",
-           "SinkLaw", "Yeoh", "constant_names", "constant_unit", "constants_text", "limiter_of", "material_from",
-           "material_of", "own_constants", "own_names", "read_constants", "with_constant"]
+           "Ogden", "SinkLaw", "Yeoh", "constant_names", "constant_unit", "constants_text", "limiter_of",
+           "material_from", "material_of", "own_constants", "own_names", "read_constants", "with_constant"]

@@ -115,27 +115,40 @@ class Material:
         return (ddpsi[grow] * np.einsum("...iJ,...kL->...iJkL", dI1, dI1) + dpsi[grow] * ddI1
                 + self.bulk_modulus * ((2 * J - 1) * J * GG - (J - 1) * J * G_cross))
 
-    def thin_sheet(self, F: np.ndarray) -> np.ndarray:
-        """F (..., 3, 3) with the F_33 that leaves no stress P_33, from the part (..., 2, 2) in the plane, det > 0."""
+    def thin_sheet(self, F: np.ndarray, fibres: np.ndarray | None = None) -> np.ndarray:
+        """F (..., 3, 3) with the F_33 that leaves no stress P_33, from the part (..., 2, 2) in the plane, det > 0.
+
+        `fibres` (..., families, 3) are directions in the plane, of a law that has fibres.
+        """
         thin = np.zeros((*F.shape[:-2], 3, 3))
         thin[..., :2, :2] = F
-        thin[..., 2, 2] = self.stretch_across(np.einsum("...iJ,...iJ", F, F), np.linalg.det(F))
+        t, j = np.einsum("...iJ,...iJ", F, F), np.linalg.det(F)
+        thin[..., 2, 2] = self.stretch_across(t, j, self.along(F, fibres))
         return thin
 
-    def stretch_across(self, t: np.ndarray, j: np.ndarray) -> np.ndarray:
+    def along(self, F: np.ndarray, fibres: np.ndarray | None) -> np.ndarray:
+        """Squared stretches (families, ...) of `fibres` in the plane, which a law of I1' alone has not."""
+        return np.zeros((0, *F.shape[:-2]))
+
+    def stretch_across(self, t: np.ndarray, j: np.ndarray, along: np.ndarray | None = None) -> np.ndarray:
         """The F_33 that leaves no stress P_33, from t = F : F and j = det F > 0 of the plane, (...).
 
-        Found by bisection of log J; the element loops use Newton's method (:mod:`.kernels.plane_stress`).
+        `along` are the squared stretches of fibres, (families, ...). Found by bisection of log J; the element loops use
+        Newton's method (:mod:`.kernels.plane_stress`).
         """
         low, high = np.full(j.shape, -12.0), np.full(j.shape, 12.0)
         for _ in range(64):
             log_J = 0.5 * (low + high)
             J = np.exp(log_J)
-            I, square = J ** (-2 / 3), (J / j) ** 2
-            _, dpsi, _ = self.isochoric(I * (t + square))
-            falls = dpsi * I * (4 / 3 * square - 2 / 3 * t) + self.bulk_modulus * J * (J - 1) < 0
+            falls = self._across(t, j, J, along) + self.bulk_modulus * J * (J - 1) < 0
             low, high = np.where(falls, log_J, low), np.where(falls, high, log_J)
         return np.asarray(np.exp(0.5 * (low + high)) / j)
+
+    def _across(self, t: np.ndarray, j: np.ndarray, J: np.ndarray, along: np.ndarray | None) -> np.ndarray:
+        """Derivative of psi with log J at a fixed deformation of the plane [MPa]."""
+        I, square = J ** (-2 / 3), (J / j) ** 2
+        _, dpsi, _ = self.isochoric(I * (t + square))
+        return np.asarray(dpsi * I * (4 / 3 * square - 2 / 3 * t))
 
     def plot(self, sink_law: SinkLaw | None = None, path: str = "", ax: Axes | None = None) -> Axes:
         """Draw stress against stretch of homogeneous deformations: with the sink full, without it dashed.

@@ -27,7 +27,8 @@ FROM_SHEAR = {
     "aaa": ("c1", lambda G, rest: G / 2), "neo-hookean": ("mu", lambda G, rest: G),
     "yeoh": ("c1", lambda G, rest: G / 2), "mooney-rivlin": ("c1", lambda G, rest: G / 2 - rest["c2"]),
     "gent": ("mu", lambda G, rest: G),
-    "arruda-boyce": ("mu", lambda G, rest: G * (rest["segments"] - 1) / (rest["segments"] - 1 / 3))}
+    "arruda-boyce": ("mu", lambda G, rest: G * (rest["segments"] - 1) / (rest["segments"] - 1 / 3)),
+    "ogden": ("mu", lambda G, rest: rest["mu"])}  # which it does not determine
 
 
 def constant_unit(name: str) -> str:
@@ -38,7 +39,8 @@ def constant_unit(name: str) -> str:
 def read_constants(law: str, text: str) -> dict[str, Any]:
     """Constants of a law from text: name = value pairs between commas; a vector is 1 0 0, or a list [1, 0, 0].
 
-    E or G become the constant of the law that they determine, and nu becomes `bulk_modulus`.
+    The numbers of a vector have a unit each, or there is one at the end for all of them. E or G become the constant of
+    the law that they determine, and nu becomes `bulk_modulus`.
 
     Raises
     ------
@@ -85,16 +87,36 @@ def _pairs(law: str, text: str) -> dict[str, Any]:
         if name in found:
             raise ParameterError(f"constants: {name} is there twice")
         if isinstance(getattr(MATERIALS[law], name, None), tuple):
-            listed = value.startswith("[") and value.endswith("]")
-            numbers = value[1:-1].split(",") if listed else value.split()
-            found[name] = tuple(in_unit(name, number.strip(), "") for number in numbers)
+            found[name] = _vector(name, value)
         else:
             found[name] = in_unit(name, value, constant_unit(name), plain=True)
     return found
 
 
+def _vector(name: str, text: str) -> tuple[float, ...]:
+    """The numbers of a vector: between the commas of a list, or between blanks."""
+    unit = constant_unit(name)
+    if text.startswith("[") and text.endswith("]"):
+        return tuple(in_unit(name, part.strip(), unit, plain=True) for part in text[1:-1].split(","))
+    parts: list[str] = []
+    for piece in text.split():
+        if parts and not re.match(r"[-+.\d]", piece):
+            parts[-1] += f" {piece}"  # a unit
+        else:
+            parts.append(piece)
+    own = [" " in part for part in parts]
+    if any(own) and not all(own):
+        if own.index(True) != len(parts) - 1:
+            raise ParameterError(f"{name} must have a unit for each number, or one at the end for all; got {text!r}")
+        parts = [part if " " in part else f"{part} {parts[-1].split(' ', 1)[1]}" for part in parts]
+    return tuple(in_unit(name, part, unit, plain=True) for part in parts)
+
+
 def _from_moduli(law: str, found: Mapping[str, Any]) -> dict[str, Any]:
     constants = {name: value for name, value in found.items() if name not in MODULI}
+    if law == "ogden" and {"E", "G"} & found.keys():
+        raise ParameterError("constants: E and G leave open how the terms of ogden share the stiffness: give mu and "
+                             "alpha, and nu")
     if law not in FROM_SHEAR:
         raise ParameterError(f"constants: E, G and nu are for isotropic laws; {law} has fibres: give its own constants")
     shear, other = FROM_SHEAR[law]
@@ -142,8 +164,8 @@ def own_constants(law: str, text: str) -> tuple[str, float | None]:
 def constants_text(material: Material) -> str:
     """Text that :func:`read_constants` reads: all constants of the law."""
     values = ((f.name, getattr(material, f.name)) for f in fields(material) if f.name not in COMMON)
-    return ", ".join(f"{name} = " + (" ".join(f"{x!r}" for x in value) if isinstance(value, tuple) else
-                                     f"{value!r} {constant_unit(name)}".strip()) for name, value in values)
+    return ", ".join(f"{name} = " + " ".join(f"{x!r}" for x in (value if isinstance(value, tuple) else (value,)))
+                     + f" {constant_unit(name)}".rstrip() for name, value in values)
 
 
 def material_of(law: str, constants: str, bulk_modulus: float, density: float, viscosity: float = 0.0) -> Material:

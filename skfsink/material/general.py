@@ -25,6 +25,7 @@ from ..system.jit import njit
 from .base import Material
 from .compiled import GENERAL_LAW, CompiledLaw
 from .crushed import crushed
+from .sheet import SheetInvariants
 
 __all__ = ["GeneralMaterial", "MooneyRivlin"]
 
@@ -99,6 +100,15 @@ class GeneralMaterial(Material):
         G = np.swapaxes(np.linalg.inv(F), -1, -2)
         return (self.isochoric_modulus(F, 0.0, fibres)
                 + self.bulk_modulus * ((2 * J - 1) * J * outer(G, G) - (J - 1) * J * crossed(G)))
+
+    def along(self, F: np.ndarray, fibres: np.ndarray | None) -> np.ndarray:
+        """Squared stretches (families, ...) of `fibres` (..., families, 3) in a plane deformed by F (..., 2, 2)."""
+        pulled = np.einsum("...iJ,...fJ->f...i", F, self._directions(fibres)[..., :2])
+        return np.einsum("f...i,f...i->f...", pulled, pulled)
+
+    def _across(self, t: np.ndarray, j: np.ndarray, J: np.ndarray, along: np.ndarray | None) -> np.ndarray:
+        found = SheetInvariants(t, j, J, np.zeros((0, *t.shape)) if along is None else along)
+        return np.asarray(np.einsum("m...,m...", self.isochoric(found.values)[1], found.across) / 3)
 
     @property
     def shear_modulus(self) -> float:

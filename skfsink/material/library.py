@@ -11,13 +11,14 @@ from .base import Material
 from .fibres import HolzapfelGasserOgden
 from .general import MooneyRivlin
 from .isotropic import AAA, ArrudaBoyce, Gent, NeoHookean, Yeoh
+from .ogden import Ogden
 from .sink import SinkLaw
 
 __all__ = ["LIMITERS", "MATERIALS", "Limiter", "limiter_of", "material_from"]
 
 MATERIALS: dict[str, type[Material]] = {
     "aaa": AAA, "neo-hookean": NeoHookean, "yeoh": Yeoh, "mooney-rivlin": MooneyRivlin, "gent": Gent,
-    "arruda-boyce": ArrudaBoyce, "hgo": HolzapfelGasserOgden}
+    "arruda-boyce": ArrudaBoyce, "ogden": Ogden, "hgo": HolzapfelGasserOgden}
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,7 @@ LIMITERS: dict[str, Limiter] = {
     "mooney-rivlin": Limiter(11.36, 10.0, _TRELOAR),
     "gent": Limiter(15.62, 10.0, _TRELOAR),
     "arruda-boyce": Limiter(13.74, 10.0, _TRELOAR),
+    "ogden": Limiter(14.42, 10.0, _TRELOAR),
     "hgo": Limiter(0.027, 10.0, "assumed: strength along the axis of 1.03 MPa, attributed to iliac adventitia in "
                    "Holzapfel, Sommer and Regitnig, J. Biomech. Eng. 126 (2004) 657-665, unverified"),
 }

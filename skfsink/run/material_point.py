@@ -46,7 +46,9 @@ def beside_theory(scene: Scene, F: np.ndarray, P: np.ndarray) -> dict[str, Any] 
     `F` and `P` (3, 3) are the mean deformation gradient and nominal stress [MPa] where the load was greatest. None
     where the deformation is no tension that the theory has a curve of, or the body has several materials, or fibres.
     """
-    if len(scene.parts) > 1 or isinstance(scene.material, GeneralMaterial):
+    material = scene.material
+    fibrous = isinstance(material, GeneralMaterial) and material.fibres(np.zeros((1, 3))).size
+    if len(scene.parts) > 1 or fibrous:
         return None
     _, stretches, directions = np.linalg.svd(F)
     along = float(stretches[0])

@@ -89,16 +89,16 @@ class Options:
     active_zone
         Explicit steps solve for γ only where it changes.
     material
-        Law of the stored energy: "aaa" (the paper's), "neo-hookean", "yeoh", "mooney-rivlin", "gent", "arruda-boyce"
-        or "hgo"; `skfsink material NAME` shows one.
+        Law of the stored energy: "aaa" (the paper's), "neo-hookean", "yeoh", "mooney-rivlin", "gent", "arruda-boyce",
+        "ogden" or "hgo"; `skfsink material NAME` shows one.
     c1
         First constant of aaa [MPa], > 0.
     c2
         Second constant of aaa [MPa], >= 0.
     constants
         Constants of another law than aaa, as "mu = 0.27 MPa, limit = 76.5"; those left out have their defaults. Of
-        all laws but hgo also "E = 1 MPa, nu = 0.499" or "G = 0.33 MPa, nu = 0.499" in place of bulk_modulus and of
-        mu or c1.
+        all laws but hgo and ogden also "E = 1 MPa, nu = 0.499" or "G = 0.33 MPa, nu = 0.499" in place of bulk_modulus
+        and of mu or c1; of ogden nu. Numbers of a vector: "mu = 0.63 0.0012 MPa, alpha = 1.3 5".
     bulk_modulus
         Bulk modulus k [MPa], > 0.
     density

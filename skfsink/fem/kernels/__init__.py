@@ -6,12 +6,14 @@ tiles              the memory layout those two work on, a region of the body aft
 tangent            tangent stiffness with material, geometric and J_bar coupling
 general, general_tangent   force and tangent for laws of several invariants, and fibres
 plane_stress       all of these for thin sheets
+general_sheet, general_sheet_tangent   the same for laws of several invariants
 viscous            viscous force, and its derivative with the velocity
 pieces             elements of a region for the second derivatives
 scalar             mass, Laplacian and sink matrices
 gradient           the Laplacian without positive off-diagonals
 """
 
+from .general_sheet_tangent import tangent_general_sheet
 from .general_tangent import tangent_general
 from .gradient import LEAST_JACOBIAN, monotone, monotone_laplacian
 from .plane_stress import tangent_plane_stress
@@ -22,5 +24,5 @@ from .tiles import Law, Tiles
 from .viscous import viscous_tangent
 
 __all__ = ["ERSATZ_STIFFNESS", "LEAST_JACOBIAN", "SOFT_GAMMA", "Law", "Tiles", "Viscous", "laplacian", "mass",
-           "monotone", "monotone_laplacian", "tangent", "tangent_general", "tangent_plane_stress", "viscous_tangent",
-           "weighted_mass"]
+           "monotone", "monotone_laplacian", "tangent", "tangent_general", "tangent_general_sheet",
+           "tangent_plane_stress", "viscous_tangent", "weighted_mass"]

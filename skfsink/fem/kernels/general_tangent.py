@@ -27,7 +27,7 @@ from .pieces import Pieces
 from .records import Solid
 from .tangent import ERSATZ_STIFFNESS, PART, SOFT_GAMMA, parts
 
-__all__ = ["tangent_general"]
+__all__ = ["adding", "tangent_general"]
 
 
 def tangent_general(space: Space, pattern: Pattern, material: GeneralMaterial, u: np.ndarray, gamma: np.ndarray,
@@ -143,11 +143,9 @@ def _in_half_plane(whole, A):  # type: ignore[no-untyped-def]
             A[row, column] = whole[r, 8 if column == 4 else column + column // 2]
 
 
-def _make(dim: int, revolved: bool = False) -> Callable[..., Any]:
-    """The element loop for one dimension, with its sizes as constants."""
-    na = 2**dim
-    nd, n2 = na * dim, dim * dim + revolved
-    _, volumetric_coupling, scatter = parts(dim, revolved)
+def adding(dim: int, revolved: bool = False) -> Callable[..., Any]:
+    """What a Gauss point adds to the matrix of its element, for one dimension."""
+    na, n2 = 2**dim, dim * dim + revolved
 
     @njit(**PART)
     def add(dN, around, where, A, T, K):  # type: ignore[no-untyped-def]
@@ -171,6 +169,16 @@ def _make(dim: int, revolved: bool = False) -> Callable[..., Any]:
                         if revolved and i == 0:
                             s += around[e, q, a] * T[n2 - 1, k]
                         K[dim * a + i, dim * bb + k] += s
+
+    return add
+
+
+def _make(dim: int, revolved: bool = False) -> Callable[..., Any]:
+    """The element loop for one dimension, with its sizes as constants."""
+    na = 2**dim
+    nd, n2 = na * dim, dim * dim + revolved
+    _, volumetric_coupling, scatter = parts(dim, revolved)
+    add = adding(dim, revolved)
 
     @njit(cache=True, nogil=True)
     def loop(address, constants, solid, x, piece, data):  # type: ignore[no-untyped-def]

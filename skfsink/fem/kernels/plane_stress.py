@@ -61,8 +61,25 @@ def _invariants(y, t, inv_j, p, s, I1):  # type: ignore[no-untyped-def]
 
 
 @njit(fastmath=FAST)
+def _stride(gradient, isochoric, J, v):  # type: ignore[no-untyped-def]
+    """Step for log y, Newton's with the curvature of the volumetric part.
+
+    `gradient` is dW/d log y, `isochoric` the second derivative of psi, and v = 3 k J.
+    """
+    exact, least = isochoric + v * (6.0 * J - 3.0), 0.1 * (isochoric + 3.0 * v * J)
+    inverse = 1.0 / (exact if exact > least else least)  # W is convex in log y for J > 1/2
+    step = -gradient * inverse
+    step = step if step < LONGEST else LONGEST
+    step = step if step > -LONGEST else -LONGEST
+    change = step * inverse * v * (18.0 * J - 4.5)
+    change = change if change < 1.5 * LONGEST else 1.5 * LONGEST
+    change = change if change > -1.5 * LONGEST else -1.5 * LONGEST
+    return step - step * change
+
+
+@njit(fastmath=FAST)
 def _step(p, s, dpsi, ddpsi, k_bulk, y):  # type: ignore[no-untyped-def]
-    """One step for log y, Newton's with the curvature of the volumetric part; returns the sum of their squares."""
+    """One step for log y; returns the sum of their squares."""
     total = 0.0
     for i in range(y.size):
         J = y[i] * y[i] * y[i]
@@ -70,15 +87,7 @@ def _step(p, s, dpsi, ddpsi, k_bulk, y):  # type: ignore[no-untyped-def]
         slope = 4.0 * s[i] - 2.0 * p[i]
         gradient = dpsi[i] * slope + v * (J - 1.0)
         isochoric = ddpsi[i] * slope * slope + dpsi[i] * (16.0 * s[i] + 4.0 * p[i])
-        exact, least = isochoric + v * (6.0 * J - 3.0), 0.1 * (isochoric + 3.0 * v * J)
-        inverse = 1.0 / (exact if exact > least else least)  # W is convex in log y for J > 1/2
-        step = -gradient * inverse
-        step = step if step < LONGEST else LONGEST
-        step = step if step > -LONGEST else -LONGEST
-        change = step * inverse * v * (18.0 * J - 4.5)
-        change = change if change < 1.5 * LONGEST else 1.5 * LONGEST
-        change = change if change > -1.5 * LONGEST else -1.5 * LONGEST
-        step -= step * change
+        step = _stride(gradient, isochoric, J, v)
         y[i] *= 1.0 + step + 0.5 * step * step
         total += step * step
     return total

@@ -12,6 +12,7 @@ from ...system.jit import njit, prange
 from .force2d import force_2d
 from .force3d import force_3d
 from .general import force_general_2d, force_general_3d
+from .general_sheet import force_general_sheet
 from .lanes import FAST
 from .plane_stress import force_plane_stress
 from .records import share
@@ -68,7 +69,7 @@ def _viscous(loop: Any) -> Loops:
 
 #: by dimension; 0 is plane stress
 FORCES = {2: _force(force_2d), 3: _force(force_3d), 0: _force(force_plane_stress)}
-#: of laws of several invariants
-GENERAL_FORCES = {2: _force(force_general_2d), 3: _force(force_general_3d)}
+#: of laws of several invariants, in the same way
+GENERAL_FORCES = {2: _force(force_general_2d), 3: _force(force_general_3d), 0: _force(force_general_sheet)}
 VOLUMETRIC = {2: _indicator(volumetric_2d), 3: _indicator(volumetric_3d)}
 VISCOUS = {2: _viscous(viscous_2d), 3: _viscous(viscous_3d)}

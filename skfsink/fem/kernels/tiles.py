@@ -12,7 +12,7 @@ Bytes an explicit step has to move for one quadrilateral (hexahedron): 16 (32) c
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numba
@@ -22,6 +22,7 @@ from ...material import CompiledLaw
 from ...system.jit import njit
 from ..space import Space
 from .faster import Faster
+from .general_sheet_tangent import stiffness_general_sheet
 from .lanes import LANES, LANES_3D
 from .plane_stress import stiffness_plane_stress
 from .records import Elements, Viscous, Volumetric
@@ -39,10 +40,14 @@ class Law(NamedTuple):
 
 
 class _Part(NamedTuple):
-    """Tiles of the elements of one material, parts of the arrays of the whole body, and the loops for them."""
+    """Tiles of the elements of one material, parts of the arrays of the whole body, and the loops for them.
+
+    `stiffness` is that of plane stress alone.
+    """
 
     loops: Loops
     elements: Elements
+    stiffness: Callable[..., float]
 
 
 class Tiles:
@@ -60,7 +65,7 @@ class Tiles:
     lanes: elements in a tile.
 
     `parts` divides the body by materials: for each its elements (None for all), and None, or for a law of several
-    invariants, in plane strain or space, the directions of its fibres (elements, families, 3).
+    invariants the directions of its fibres (elements, families, 3).
 
     The loops over tiles are shared by `threads` threads, those of the machine at the most, where that is faster (see
     :class:`.Faster`) and the body has `WORTH` Gauss points; results do not depend on it.
@@ -83,9 +88,10 @@ class Tiles:
         for (_, fibres), a, b in zip(parts, ends[:-1], ends[1:]):
             directions = np.empty((b - a, 0, self.lanes)) if fibres is None else _in_tiles(
                 fibres.reshape(len(fibres), -1), self.lanes)
-            loops = GENERAL_FORCES[dim] if fibres is not None else FORCES[0 if plane_stress else dim]
+            loops = (FORCES if fibres is None else GENERAL_FORCES)[0 if plane_stress else dim]
             self._parts.append(_Part(loops, Elements(self.conn[a:b], self.geometry[a:b], self.gamma[a:b], directions,
-                                                     self._force[a:b], self.W[a:b], self.psi[a:b])))
+                                                     self._force[a:b], self.W[a:b], self.psi[a:b]),
+                                     stiffness_plane_stress if fibres is None else stiffness_general_sheet))
         none = np.empty((self.count, 0, self.lanes))
         self._whole = Elements(self.conn, self.geometry, self.gamma, none, self._force, self.W, self.psi)
         most: int = numba.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]
@@ -211,8 +217,8 @@ class Tiles:
 
     def plane_stiffness(self, x: np.ndarray, laws: Sequence[Law], inverse_mass: np.ndarray) -> float:
         """What :meth:`volumetric` is, for plane stress, where nothing resists a change of area but shear."""
-        return max(float(stiffness_plane_stress(law.psi.address, law.constants, law.bulk_modulus, x, part.elements,
-                                                inverse_mass)) for law, part in zip(laws, self._parts))
+        return max(float(part.stiffness(law.psi.address, law.constants, law.bulk_modulus, x, part.elements,
+                                        inverse_mass)) for law, part in zip(laws, self._parts))
 
     def mean_force(self) -> float:
         """Mean magnitude of the forces the elements exert on their nodes, by component, at the last evaluation.
