@@ -104,20 +104,24 @@ class Trial:
 
     def iterate(self) -> bool:
         """Iterate both fields until they are in balance; False where the step has to be given up."""
-        c = self.scheme.controls
         try:
-            while True:
-                residual, inertia, live = self._residual()
-                if self._balanced(residual, inertia, live):
-                    self.cracked = self._runs_through()
-                    return not (self.cracked or self._is_inside_out())
-                if self.corrections == c.max_iterations:
-                    return False
-                self._correct(residual, live)
-                if c.coupling == "iterated":
-                    self._couple()
+            with np.errstate(over="ignore"):  # where a trial runs away, before its energy is no finite number
+                return self._converges()
         except _Rejected:
             return False
+
+    def _converges(self) -> bool:
+        c = self.scheme.controls
+        while True:
+            residual, inertia, live = self._residual()
+            if self._balanced(residual, inertia, live):
+                self.cracked = self._runs_through()
+                return not (self.cracked or self._is_inside_out())
+            if self.corrections == c.max_iterations:
+                return False
+            self._correct(residual, live)
+            if c.coupling == "iterated":
+                self._couple()
 
     def _evaluate(self) -> None:
         """Force at the displacement; a trial without a finite energy is given up."""
