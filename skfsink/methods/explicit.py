@@ -58,6 +58,7 @@ class Explicit:
     length, interval: of the steps, and between solves for gamma.
     dt: the current step [s].   estimates: frequency estimates made.   factorisations: none.
     added_mass: of the smallest elements, over that of the intact body; see :mod:`.raised_mass`.
+    subcycling: short steps of the smallest elements, None without.
     reaction: (n, dim) internal and viscous force less the loads.
     """
 

@@ -24,6 +24,7 @@ from typing import Protocol
 import numpy as np
 
 from ..errors import ParameterError
+from ..fem.exchange import ALONE
 from ..fem.selection import Selection, selected_mesh
 from ..fem.space import Space
 from ..fields.momentum import Momentum
@@ -65,7 +66,7 @@ class Subcycling:
         The body has what subcycling does not know.
     """
 
-    LAYERS = 2
+    LAYERS = 3
 
     def __init__(self, momentum: Momentum, free: np.ndarray, controls: ExplicitControls, longest: float) -> None:
         _check(momentum)
@@ -207,7 +208,8 @@ def check_subcycling(loading: Loading, controls: _Controls, viscosity: float) ->
 
 
 def _check(momentum: Momentum) -> None:
-    _refuse({"contact": momentum.contact is not None, "dead loads": momentum.dead is not None,
+    _refuse({"several ranks": momentum.space.exchange is not ALONE,
+             "contact": momentum.contact is not None, "dead loads": momentum.dead is not None,
              "pressures": momentum.followers is not None, "an oblique plane on which nodes slide":
              momentum.sliding is not None, "viscosity": momentum.is_viscous})
 
