@@ -85,7 +85,10 @@ BODIES = {"jbar": (layered(4), "jbar", 0.0), "planestress": (layered(4), "planes
 
 @pytest.mark.parametrize("name", BODIES)
 def test_one_short_step_is_the_step(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Fails if kicks and short step do not add up to the step of the scheme, in displacement, velocity or energies."""
+    """Fails if kicks and short step do not add up to the step of the scheme, in displacement, velocity or energies.
+
+    Seen to fail with the whole acceleration in the first kick.
+    """
     patched(monkeypatch, 1)
     space, element, pull = BODIES[name]
     one, other = Swinging(space, element, pull), Swinging(space, element, pull, subcycled=share(space))
@@ -103,7 +106,8 @@ def test_one_short_step_is_the_step(name: str, monkeypatch: pytest.MonkeyPatch) 
 @pytest.mark.parametrize("name", BODIES)
 def test_error_is_of_second_order(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if kicks stand at the wrong time, or the other forces are not the whole ones less those of the fast
-    elements. Seen to fail with the second kick by the acceleration before the step."""
+    elements. Seen to fail with accelerations by the fast elements that stay those of the start, with 3 % less of them in
+    the last kick, and, at a grip, with nodes that are held standing still in short steps."""
     space, element, pull = BODIES[name]
     T = 3.2e-6
     exact = Swinging(space, element, pull).until(T, 2.5e-9)
@@ -118,7 +122,8 @@ def test_error_is_of_second_order(name: str, monkeypatch: pytest.MonkeyPatch) ->
 def test_energy_is_conserved_for_long(ratio: float, courant: float) -> None:
     """Fails if the scheme resonates, or the step is not that of the elements outside.
 
-    Seen to fail without layers of neighbours, and with one, at some of these ratios and Courant numbers.
+    Seen to fail without layers of neighbours, and with one, at some of these ratios and Courant numbers, and with the
+    step of the whole body.
     """
     space = layered(ratio)
     body = Swinging(space, subcycled=share(space), courant=courant)
@@ -186,7 +191,10 @@ def test_step_made_again_begins_where_the_first_did(monkeypatch: pytest.MonkeyPa
 
 
 def test_crack_runs_as_with_short_steps_of_all(thin: Fracture) -> None:
-    """Fails if density, history or masses of the fast elements are not those of the body: the crack is then another."""
+    """Fails if density or masses of the fast elements are not those of the body: the crack is then another.
+
+    Seen to fail with the density of the start in the short steps.
+    """
     ends = []
     for subcycled in (0.0, share(thin.momentum.space)):
         explicit, state = event(thin, subcycled=subcycled, gamma_every=0), thin.fresh()
@@ -203,7 +211,10 @@ def test_crack_runs_as_with_short_steps_of_all(thin: Fracture) -> None:
 
 
 def test_symmetric_stays_symmetric(thin: Fracture) -> None:
-    """Fails if the short steps do not treat both halves alike."""
+    """Fails if the short steps do not treat both halves alike.
+
+    Seen to fail with 1e-5 more acceleration at every second node.
+    """
     space = thin.momentum.space
     image = np.array([int(np.argmin(np.hypot(*(space.X - (x, 1 - y)).T))) for x, y in space.X])
     explicit, state = event(thin), thin.fresh()
@@ -216,7 +227,10 @@ def test_symmetric_stays_symmetric(thin: Fracture) -> None:
 
 
 def test_history_is_that_of_the_short_steps(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Fails if what a fast element goes through within a long step is lost, or shows in others."""
+    """Fails if what a fast element goes through within a long step is lost, or shows in others.
+
+    Seen to fail without `merge`.
+    """
     patched(monkeypatch, 8)
     space = layered(4)
     body = Swinging(space, subcycled=share(space), speed=2e4)
@@ -256,10 +270,16 @@ def test_run_continues_to_the_same_bits(thin: Fracture, tolerance: float) -> Non
     assert state.gamma.min() < 0.8
     same_bits(state, resumed)
     assert state.ledger == resumed.ledger and state.time == resumed.time
+    after = two.memory()
+    for name, value in one.memory().items():
+        np.testing.assert_array_equal(after[name], value)
 
 
 def test_small_elements_and_their_neighbours_are_fast() -> None:
-    """Fails if others are, materials and directions are not those of the elements, or equal elements are cycled."""
+    """Fails if others are, materials are not those of the elements, or equal elements are cycled.
+
+    Seen to fail without the regions.
+    """
     space = layered(4)
     stiff = np.flatnonzero(space.X[space.conn, 0].mean(axis=1) < 0.5)
     regions = (Region("left", stiff, AAA(c1=0.7), SinkLaw()),)
