@@ -106,8 +106,11 @@ def test_one_short_step_is_the_step(name: str, monkeypatch: pytest.MonkeyPatch) 
 @pytest.mark.parametrize("name", BODIES)
 def test_error_is_of_second_order(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails if kicks stand at the wrong time, or the other forces are not the whole ones less those of the fast
-    elements. Seen to fail with accelerations by the fast elements that stay those of the start, with 3 % less of them in
-    the last kick, and, at a grip, with nodes that are held standing still in short steps."""
+    elements.
+
+    Seen to fail with accelerations by the fast elements that stay those of the start, with 3 % less of them in the last
+    kick, and, at a grip, with nodes that are held standing still in short steps.
+    """
     space, element, pull = BODIES[name]
     T = 3.2e-6
     exact = Swinging(space, element, pull).until(T, 2.5e-9)
