@@ -117,8 +117,8 @@ def test_options_reach_what_they_are_named_after(kind: Any, option_of: dict[str,
         force_floor=0.01, event_time=1e-4, aftermath=2e-5, record_every=2e-6, frame_every=3e-6, balance_tolerance=0.1,
         checkpoint_every=10.0, threads=2, active_zone=False, phi=0.2, m=8.0, length_scale=0.2, c1=0.5, c2=1.0,
         bulk_modulus=400.0, density=1000.0, kernels="forms", gradient="gauss", density_solver="jacobi",
-        linear="multigrid", viscosity=1e-5, bulk_viscosity_linear=0.06, bulk_viscosity_quadratic=1.2, raised_mass=0.02,
-        fields="W", pictures="svg", series="vtkhdf", stop="arrival")
+        linear="multigrid", viscosity=1e-5, bulk_viscosity_linear=0.06, bulk_viscosity_quadratic=1.2, raised_mass=0.0,
+        subcycled=0.001, fields="W", pictures="svg", series="vtkhdf", stop="arrival")
     controls = changed.controls()
     made = {ExplicitControls: controls.explicit, HHTControls: controls.hht, StaticsControls: controls.statics,
             Controls: controls, SinkLaw: changed.sink_law(), AAA: changed.stored_energy()}[kind]

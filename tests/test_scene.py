@@ -84,10 +84,11 @@ def test_fingerprint_tells_scenes_apart(mesh: Path, tmp_path: Path) -> None:
         kernels="forms", energy_tolerance=1e-4, gradient="gauss", viscosity=1e-5,
         bulk_viscosity_linear=0.06, bulk_viscosity_quadratic=1.2, raised_mass=0.02, density_solver="jacobi",
         linear="multigrid", fields="W", pictures="svg", series="vtkhdf", stop="arrival").parameters().items()
-        if name not in (*of_named_meshes, "analysis", "start", "material", "constants", "contact", "debris")]
+        if name not in (*of_named_meshes, "analysis", "start", "material", "constants", "contact", "debris",
+                        "subcycled")]
     others += [scene(mesh, material="gent"), scene(mesh, material="gent", constants="mu = 0.3")]
     others += [scene(mesh, analysis="quasistatic"), scene(mesh, start="rest"), scene(mesh, contact=True),
-               scene(mesh, debris="remove")]
+               scene(mesh, debris="remove"), scene(mesh, raised_mass=0.0, subcycled=0.001)]
     bodies = []
     for change in (0, 1, 2):
         body = plate(n=13 if change else 11)

@@ -346,7 +346,7 @@ def test_runs_with_and_without_raised_mass_solve_for_gamma_as_often() -> None:
     """Fails if the reference, whose steps are a tenth as long, solves ten times as often: that alone moves a crack."""
     stored = json.loads((Path(__file__).parents[1] / "docs" / "images" / "speed_accuracy_raised.json").read_text())
     apart = {key: p["gamma_every"] * (p["start"] + p["transit"]) / p["steps"] for key, p in stored["points"].items()}
-    ringed = [value for key, value in apart.items() if "no rings" not in key]
+    ringed = [value for key, value in apart.items() if "no rings" not in key and "later" not in key]  # of two intervals
     assert 0.05 < min(ringed) < max(ringed) < 0.13  # microseconds
     (planned,) = (p for p in RAISED.plan(True) if p.key.startswith("0.001/"))
     found = planned.compute()

@@ -6,8 +6,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import skfem
 
-__all__ = ["Selection"]
+from .space import Space
+
+__all__ = ["Selection", "selected_mesh"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +37,12 @@ class Selection:
     def node(self) -> np.ndarray:
         """Number in the part of each node of the body, (n_nodes,); -1 of those it does not have."""
         return _here(self.nodes, self.n_nodes)
+
+
+def selected_mesh(space: Space, part: Selection) -> skfem.Mesh:
+    """Elements and nodes of a part, of the mesh of the whole body."""
+    return type(space.mesh)(np.ascontiguousarray(space.X[part.nodes].T),
+                            np.ascontiguousarray(part.node[space.mesh.t[:, part.elements]]))
 
 
 def _here(numbers: np.ndarray, count: int) -> np.ndarray:

@@ -17,7 +17,7 @@ from ..errors import ParameterError
 from ..units import Unit
 from . import Material, SinkLaw, limiter_of, material_of, own_constants
 
-__all__ = ["Region", "RegionLaw", "by_element", "check_lengths", "divided", "rest_of"]
+__all__ = ["Region", "RegionLaw", "among", "by_element", "check_lengths", "divided", "rest_of"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +49,12 @@ class Region:
             raise ParameterError(f"the elements of region {self.name} must be a list of whole numbers; got an array "
                                  f"of {elements.dtype} with the shape {elements.shape}")
         object.__setattr__(self, "elements", np.unique(elements).astype(np.int64))
+
+
+def among(regions: Sequence[Region], elements: np.ndarray) -> tuple[Region, ...]:
+    """The regions that have some of `elements` (m,), by their numbers among these."""
+    found = ((region, np.flatnonzero(np.isin(elements, region.elements))) for region in regions)
+    return tuple(Region(region.name, own, region.material, region.sink_law) for region, own in found if own.size)
 
 
 def rest_of(regions: Sequence[Region], n_elements: int) -> np.ndarray:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-from ..errors import choose, require
+from ..errors import ParameterError, choose, require
 from ..fem.linear import LINEAR
 
 __all__ = ["COUPLINGS", "DEBRIS", "MASSES", "EventControls", "ExplicitControls", "HHTControls", "StaticsControls"]
@@ -31,6 +31,8 @@ class ExplicitControls:
     debris: "keep" or "remove" (delete pieces smaller than l that are cut off from all grips).
     raised_mass: greatest share of the volume whose elements get more mass, lest they shorten the step, in [0, 0.5];
         see :mod:`.raised_mass`.
+    subcycled: greatest share of the volume whose elements take short steps of their own instead, in [0, 0.5]; then
+        `raised_mass` is 0. See :mod:`.subcycling`.
     """
 
     courant: float = 0.8
@@ -41,6 +43,7 @@ class ExplicitControls:
     energy_tolerance: float = 2e-5
     debris: str = "keep"
     raised_mass: float = 0.01
+    subcycled: float = 0.0
 
     def __post_init__(self) -> None:
         require("courant", self.courant, low=0, high=1, low_open=True)
@@ -51,6 +54,9 @@ class ExplicitControls:
         require("energy_tolerance", self.energy_tolerance, low=0, high=1)
         choose("debris", self.debris, DEBRIS)
         require("raised_mass", self.raised_mass, low=0, high=0.5)
+        if require("subcycled", self.subcycled, low=0, high=0.5) and self.raised_mass:
+            raise ParameterError(f"subcycled {self.subcycled:g} is for elements as heavy as they are; got raised_mass "
+                                 f"{self.raised_mass:g}: take raised_mass 0")
 
 
 @dataclass(frozen=True)

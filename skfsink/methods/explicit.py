@@ -33,9 +33,10 @@ from ..fields.density import Density
 from ..fields.state import State
 from .controls import EventControls, ExplicitControls
 from .nodal_steps import half_square, kick, move, viscous_work
-from .raised_mass import raised_mass
+from .raised_mass import raised_mass, small_elements
 from .solve_interval import SolveInterval
 from .step_length import StepLength
+from .subcycling import Subcycling
 
 __all__ = ["Explicit"]
 
@@ -57,6 +58,7 @@ class Explicit:
     length, interval: of the steps, and between solves for gamma.
     dt: the current step [s].   estimates: frequency estimates made.   factorisations: none.
     added_mass: of the smallest elements, over that of the intact body; see :mod:`.raised_mass`.
+    subcycling: short steps of the smallest elements, None without.
     reaction: (n, dim) internal and viscous force less the loads.
     """
 
@@ -80,7 +82,11 @@ class Explicit:
         self._grip_velocity, self._knot = self.loading.velocity(0.0), np.inf
         self._mass_floor = max(self.controls.mass_floor, 1e-12)  # a node without mass or force stays where it is
         self.interval = SolveInterval(body, self.controls.gamma_every)
-        self.length = StepLength(self.momentum, self.free, self.controls, self.interval.longest)
+        long_step, self.subcycling = self.free, None
+        if self.controls.subcycled and small_elements(self.momentum, self.controls.subcycled).size:
+            self.subcycling = Subcycling(self.momentum, self._free, self.controls, self.interval.longest)
+            long_step = (self._free & ~self.subcycling.inner[:, None]).ravel()
+        self.length = StepLength(self.momentum, long_step, self.controls, self.interval.longest)
         self._since_gamma = 0
         self._factors, self.added_mass = raised_mass(self.momentum, self.controls.raised_mass)
         self._viscous: np.ndarray | None = None  # viscous force in `reaction`
@@ -96,11 +102,10 @@ class Explicit:
         """Forces, masses and accelerations of `state`; to be called once before stepping, and after a resume."""
         self.momentum.set_time(state.grip)
         self._grip_velocity, self._knot = self.loading.velocity(state.grip), self.loading.corner(state.grip)
-        self.momentum.set_gamma(state.gamma, state.deleted)
-        self._set_mass()
+        self._take_density(state)
         self.reaction = self.momentum.force(state.u)
         self._W = self.momentum.backend.W
-        self._W_max = self.momentum.backend.tile(state.W_max)
+        self._take_history(state)
         self._elastic, self._pressed = self.momentum.energy, self.momentum.pressed
         self._compression, self._viscous = 0.0, None
         if self.momentum.is_viscous:
@@ -110,6 +115,24 @@ class Explicit:
         self._spare, self._du = np.empty_like(self.reaction), np.empty_like(self.reaction)
         self._next = np.empty_like(state.u), np.empty_like(state.u), np.empty_like(state.u)
 
+    def _take_density(self, state: State) -> float:
+        """Take density and deleted elements, and the masses they leave; returns the stored energy that goes."""
+        taken = self.momentum.set_gamma(state.gamma, state.deleted)
+        if self.subcycling is not None:
+            self.subcycling.use(state.gamma, state.deleted)
+        self._set_mass()
+        return taken
+
+    def _take_history(self, state: State) -> None:
+        self._W_max = self.momentum.backend.tile(state.W_max)
+        if self.subcycling is not None:
+            self.subcycling.start(state.W_max)
+
+    def _give_history(self, state: State) -> None:
+        state.W_max = self.momentum.backend.untile(self._W_max)
+        if self.subcycling is not None:
+            self.subcycling.merge(state.W_max)
+
     def _set_mass(self) -> None:
         self.mass = self.momentum.lumped_mass(self._mass_floor, self._factors)
         self._moving, contact = self._free, self.momentum.contact
@@ -118,6 +141,9 @@ class Explicit:
             self.mass[contact.massless.any(axis=1)] = 0.0
         mass = self.mass[:, None]
         self._inverse = np.divide(self._moving, mass, out=np.zeros(self._free.shape), where=mass > 0.0)  # 0 where held
+        self._swinging = self._inverse  # in the long step
+        if self.subcycling is not None:
+            self._swinging = self.subcycling.weigh(self.mass, self._inverse)
 
     def begin(self, state: State) -> None:
         """Set the body in motion: accelerations from the forces, energies of the start."""
@@ -125,6 +151,8 @@ class Explicit:
         self.start(state)
         np.divide(-self.momentum.unheld(self.reaction), self.mass[:, None], out=state.a, where=self._inverse > 0.0)
         state.a[self._inverse == 0.0] = 0.0
+        if self.subcycling is not None:
+            self.subcycling.begin(state.u)
         state.ledger.initial = state.ledger.elastic = self._elastic
         state.ledger.kinetic, state.ledger.loads = self._kinetic(state), self.momentum.loads
         state.ledger.contact = self._pressed
@@ -148,7 +176,9 @@ class Explicit:
         InstabilityError
             No step, however short, keeps the energy.
         """
-        self.length.look(state.step, state.u, self.mass, self._inverse, self._compression)
+        self.length.look(state.step, state.u, self.mass, self._swinging, self._compression)
+        if self.subcycling is not None:
+            self.subcycling.look(state.step, state.u)
         while not self._try(state):
             if self.length.is_given_up:
                 self.length.give_up(state, self._next[1])
@@ -172,6 +202,8 @@ class Explicit:
         (u, v, a), du = self._next, self._du
         pace = self.loading.mean(state.grip, grip, dt) if self.loading.smooth else self._grip_velocity
         move((state.u, state.v, state.a), self._moving, pace, dt, (u, v, du))
+        if self.subcycling is not None:
+            self.subcycling.advance((state.u, state.v, state.a), pace, dt, (u, v, du))
         force = self.momentum.force(u, self._spare)
         viscous = self._viscous
         if viscous is not None:
@@ -184,6 +216,8 @@ class Explicit:
         ledger = state.ledger
         elastic, pressed = self.momentum.energy, self.momentum.pressed
         energy_fed_in = dt * dt / 8 * swing + (elastic - self._elastic) + (pressed - self._pressed) - trapezoid
+        if self.subcycling is not None:
+            energy_fed_in += self.subcycling.gain(v, (state.a, a), du)
         if dead is not None and before is not None:
             energy_fed_in -= dead.effort(before, du)
         given = self.momentum.pressure_work(state.u, u, pressures)
@@ -206,6 +240,8 @@ class Explicit:
         state.u, state.v, state.a = u, v, a
         self.reaction, self._spare = force, old
         np.maximum(self._W_max, self._W, out=self._W_max)
+        if self.subcycling is not None:
+            self.subcycling.accept()
         if dead is not None and before is not None:
             ledger.work += dead.changed(before, state.u - 0.5 * du)
             ledger.loads = self.momentum.loads
@@ -246,7 +282,7 @@ class Explicit:
     def update_density(self, state: State) -> None:
         """Solve for gamma from the history, book what the sink takes, delete failed elements, and debris they leave."""
         momentum, ledger = self.momentum, state.ledger
-        state.W_max = momentum.backend.untile(self._W_max)
+        self._give_history(state)
         before = Density(state.gamma, state.sink, self._zones)
         now = self.density.update(state.W_max, before, self.GAMMA_TOLERANCE)
         if now is before:
@@ -261,7 +297,7 @@ class Explicit:
         ledger.sink_kinetic += moving
         if some and self.controls.debris == "remove" and self._exchange.total(
                 delete_debris(state, self.density, self._held).size):
-            self._W_max = momentum.backend.tile(state.W_max)
+            self._take_history(state)
             gone = sum(self._thin(state))
             ledger.deletion += gone
             ledger.debris += gone
@@ -271,8 +307,7 @@ class Explicit:
         """Take density and deleted elements of `state`; returns the stored and the kinetic energy that go with it."""
         momentum, ledger, mass = self.momentum, state.ledger, self.mass
         dead, loads = momentum.dead, None if momentum.dead is None else momentum.dead.values
-        stored = momentum.set_gamma(state.gamma, state.deleted)
-        self._set_mass()
+        stored = self._take_density(state)
         if self._viscous is not None:
             ratio = np.divide(self.mass, mass, out=np.zeros_like(mass), where=mass > 0.0)
             self._viscous *= ratio[:, None]  # as the inertia, of kept accelerations; 0 without mass
@@ -287,7 +322,7 @@ class Explicit:
 
     def sync(self, state: State) -> None:
         """Bring `state.W_max`, and the motion of nodes that follow the lips, up to date."""
-        state.W_max = self.momentum.backend.untile(self._W_max)
+        self._give_history(state)
         if self.momentum.contact is not None:
             self.momentum.contact.place(state.v)
             self.momentum.contact.place(state.a)
@@ -319,7 +354,8 @@ class Explicit:
 
     def step_share(self, state: State) -> float:
         """The step over the stability limit of `state` as it is now; nothing is changed."""
-        return self.length.share(state.u, self.mass, self._inverse, self._compression)
+        share = self.length.share(state.u, self.mass, self._swinging, self._compression)
+        return share if self.subcycling is None else max(share, self.subcycling.step_share(state.u, self.dt))
 
     # --- checkpoints ---
     def memory(self) -> dict[str, np.ndarray]:
@@ -327,7 +363,7 @@ class Explicit:
         return {"reaction": self.reaction, "zone_depths": np.array([zone.depth for zone in self._zones], float),
                 **{name: np.array(getattr(self, name)) for name in self._REMEMBERED}, **self.length.memory(),
                 **({} if self._viscous is None else {"viscous": self._viscous}),
-                **self.momentum.memory()}
+                **({} if self.subcycling is None else self.subcycling.memory()), **self.momentum.memory()}
 
     def restore(self, state: State, memory: dict[str, np.ndarray]) -> None:
         """Go on exactly where :meth:`memory` was taken."""
@@ -339,5 +375,7 @@ class Explicit:
         for name in self._REMEMBERED:
             setattr(self, name, memory[name].item())
         self.length.restore(memory)
+        if self.subcycling is not None:
+            self.subcycling.restore(memory)
         if self.density.zone is not None:
             self._zones = tuple(self.density.zone.of_depth(depth) for depth in memory["zone_depths"])

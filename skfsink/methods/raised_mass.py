@@ -20,7 +20,7 @@ import numpy as np
 from ..fem.space import Space
 from ..fields.momentum import Momentum
 
-__all__ = ["raised_mass"]
+__all__ = ["raised_mass", "small_elements"]
 
 
 def raised_mass(momentum: Momentum, share: float) -> tuple[np.ndarray | None, float]:
@@ -33,6 +33,20 @@ def raised_mass(momentum: Momentum, share: float) -> tuple[np.ndarray | None, fl
     """
     if share == 0.0:
         return None, 0.0
+    space, exchange = momentum.space, momentum.space.exchange
+    factors = _ratios(momentum, share)[:, None]
+    mass = momentum.rho0 * space.V[:, None]
+    added = exchange.total(float((mass * (factors - 1)).sum())) / exchange.total(float(mass.sum()))
+    return (factors, added) if added > 0.0 else (None, 0.0)
+
+
+def small_elements(momentum: Momentum, share: float) -> np.ndarray:
+    """Numbers (m,) of the elements that :func:`raised_mass` gives more mass."""
+    return np.flatnonzero(_ratios(momentum, share) > 1.0)
+
+
+def _ratios(momentum: Momentum, share: float) -> np.ndarray:
+    """omega_e^2 of each element over that of the fastest that is not among the share, 1 at least (ne,)."""
     space, square = momentum.space, np.empty(momentum.space.n_elements)
     for material, elements, _ in momentum.parts:
         square[slice(None) if elements is None else elements] = material.dilatational_wave_speed**2
@@ -42,10 +56,7 @@ def raised_mass(momentum: Momentum, share: float) -> tuple[np.ndarray | None, fl
     fastest = np.argsort(-squares, kind="stable")
     count = np.count_nonzero(np.cumsum(V[fastest]) <= share * V.sum())
     ratio = square / squares[fastest[count]]
-    factors = np.where(ratio > 1 + 1e-9, ratio, 1.0)[:, None]
-    mass = momentum.rho0 * space.V[:, None]
-    added = exchange.total(float((mass * (factors - 1)).sum())) / exchange.total(float(mass.sum()))
-    return (factors, added) if added > 0.0 else (None, 0.0)
+    return np.where(ratio > 1 + 1e-9, ratio, 1.0)
 
 
 def _slopes(space: Space) -> np.ndarray:

@@ -191,7 +191,7 @@ def _check(scene: Scene, job: _Job) -> None:
         _copied(job.observers)
     check_memory(scene, job.display)
     c = scene.controls
-    refuse_on_ranks(scene, c.analysis, c.integrator, c.statics.linear, job.ranks.partition)
+    refuse_on_ranks(scene, c.analysis, c.integrator, c.statics.linear, job.ranks.partition, c.explicit.subcycled)
     if c.series == "vtkhdf":
         check_h5py()
         if job.ranks.frame_pieces:

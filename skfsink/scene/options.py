@@ -166,6 +166,8 @@ class Options:
         Pieces smaller than l that an explicit event has cut off from all grips: "keep" or "remove" (delete them).
     raised_mass
         Greatest share of the volume whose elements get more mass, lest they shorten the explicit step, in [0, 0.5].
+    subcycled
+        Greatest share of the volume whose elements take short explicit steps of their own instead, in [0, 0.5].
     mass_floor
         Least lumped mass of a node, relative to the intact one, in [0, 1).
     hht_alpha
@@ -258,6 +260,7 @@ class Options:
     energy_tolerance: Annotated[float, EXPLICIT] = ExplicitControls.energy_tolerance
     debris: Annotated[str, EXPLICIT] = ExplicitControls.debris
     raised_mass: Annotated[float, EXPLICIT] = ExplicitControls.raised_mass
+    subcycled: Annotated[float, EXPLICIT] = ExplicitControls.subcycled
     mass_floor: Annotated[float, EXPLICIT] = ExplicitControls.mass_floor
     hht_alpha: Annotated[float, HHT] = HHTControls.alpha
     hht_dt: Annotated[float, HHT, Unit("s")] = HHTControls.dt
@@ -345,7 +348,7 @@ class Options:
         return Controls(
             **shared, explicit=ExplicitControls(self.courant, self.gamma_every, self.mass_floor,
                                                 energy_tolerance=self.energy_tolerance, debris=self.debris,
-                                                raised_mass=self.raised_mass),
+                                                raised_mass=self.raised_mass, subcycled=self.subcycled),
             hht=HHTControls(self.hht_alpha, self.hht_dt, coupling=self.coupling, mass=self.mass,
                             mass_floor=self.mass_floor),
             statics=StaticsControls(front=self.front, linear=self.linear))

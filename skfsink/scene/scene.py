@@ -23,6 +23,7 @@ from ..meshing.cracks import InitialCrack
 from ..meshing.mesh_file import one_line
 from ..meshing.sample import Sample
 from ..meshing.symmetry import Whole
+from ..methods.subcycling import check_subcycling
 from .controls import Controls
 from .digest import digest
 from .fibres import directions_of
@@ -120,6 +121,8 @@ class Scene:
             raise ParameterError(f"start rest is for grips of constant velocity; this scene has {what}: take start "
                                  f"onset")
         self._check_beginning()
+        if self.controls.explicit.subcycled and self.controls.dynamic and self.controls.integrator == "explicit":
+            check_subcycling(loading, self.controls, max(part.material.viscosity for part in self.parts))
         if self.controls.start == "rest" and loading.speed(0.0) == 0.0:
             raise ParameterError("start rest needs a grip that moves; all of them are still: give one a velocity, or "
                                  "take start onset")

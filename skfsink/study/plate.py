@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -27,9 +27,6 @@ from .meshes import load_plate
 
 __all__ = ["NO_REJECTION", "PULLED", "SLAB", "SPEED", "Front", "Integrator", "Make", "Plate", "first_passages", "warm"]
 
-Integrator = Explicit | HHT
-Make = Callable[["Plate"], Integrator]
-
 #: options of the two integrators with which no step is rejected for its energy
 NO_REJECTION = ExplicitControls(energy_tolerance=0.0), HHTControls(gain_tolerance=1.0)
 SPEED = 1e-3  # of a grip [mm/s]; it only sets the clock of the loading
@@ -38,6 +35,23 @@ PULLED = (Grip("top", (0.0, SPEED)), Grip("bottom", (0.0, -SPEED)))
 #: the same for a slab of hexahedra whose faces are held in z: plane strain
 SLAB = (Grip("top", (0.0, SPEED, 0.0)), *(Grip(face, (None, None, 0.0)) for face in ("back", "front")),
         Grip("bottom", (0.0, -SPEED, 0.0)))
+
+
+class Integrator(Protocol):
+    """What an event asks of an integrator."""
+
+    @property
+    def rejected(self) -> int:
+        """Steps that were made again, shorter."""
+
+    def begin(self, state: State) -> None:
+        """Set the body in motion."""
+
+    def run(self, state: State, t_end: float) -> Iterator[State]:
+        """Step until `t_end` [s], yielding the state after each step."""
+
+
+Make = Callable[["Plate"], Integrator]
 
 
 class _Exact(DensitySolver):

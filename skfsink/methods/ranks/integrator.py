@@ -65,7 +65,8 @@ def ranks_text(analysis: str, integrator: str, linear: str) -> str:
             f"statics with linear {' or '.join(PETSC)}")
 
 
-def refuse(scene: BodyScene, analysis: str, integrator: str, linear: str, parted: Path | None = None) -> None:
+def refuse(scene: BodyScene, analysis: str, integrator: str, linear: str, parted: Path | None = None,
+           subcycled: float = 0.0) -> None:
     """Refuse what the ranks that there are cannot compute, and solvers that are not there, before the body is loaded.
 
     The same of parts in a folder that are not those of this mesh for these ranks.
@@ -89,7 +90,7 @@ def refuse(scene: BodyScene, analysis: str, integrator: str, linear: str, parted
     if parts or (analysis != "quasistatic" and integrator == "explicit"):
         check_ranks(comm.size, scene.space.n_elements)
     if analysis != "quasistatic" and integrator == "explicit":
-        check_parts(scene.space, scene.loading(), scene.controls)
+        check_parts(scene.space, scene.loading(), scene.controls, subcycled)
 
 
 def _is_light(body: Body) -> bool:

@@ -19,7 +19,7 @@ from ...fields.momentum import Momentum
 from ...fields.state import State
 from ...loads.schedule import Loading
 from ...material import Material, SinkLaw
-from ...material.regions import Region
+from ...material.regions import Region, among
 from ..controls import ExplicitControls
 from .mpi import MPIExchange
 from .parted import Parted
@@ -81,10 +81,10 @@ class PartOfBody:
         return Body(momentum, density, self.loading, self.deletion)
 
 
-def check_parts(space: Space, loading: Loading, controls: BodyControls) -> None:
+def check_parts(space: Space, loading: Loading, controls: BodyControls, subcycled: float = 0.0) -> None:
     """Refuse what cannot be computed in parts of a body (ParameterError)."""
     what = ("contact" if controls.contact else "kernels forms" if controls.kernels != "compiled"
-            else "the consistent sink" if controls.sink == "consistent" else "")
+            else "the consistent sink" if controls.sink == "consistent" else "subcycled elements" if subcycled else "")
     if what:
         raise ParameterError(f"several ranks cannot compute {what}: start it on one rank")
     none = np.zeros(0, np.int64)
@@ -108,22 +108,12 @@ def parts_of(body: Body, controls: ExplicitControls, ranks: int, parted: Parted 
         absent = np.flatnonzero(np.isin(part.elements, density.absent))
         yield PartOfBody(
             part, space.n_nodes, mesh, space.axisymmetric, momentum.material, density.law,
-            _regions(body, part.elements),
+            among(momentum.regions, part.elements),
             {"element": momentum.element, "force_floor": momentum.force_floor,
              "bulk_viscosity": BulkViscosity(*momentum.bulk_viscosity)},
             {"sink": density.sink, "unchanged": density.unchanged, "gradient": density.gradient, "absent": absent,
              "active_zone": density.active_zone},
             body.loading.of_part(selection), body.deletion, controls, parted)
-
-
-def _regions(body: Body, elements: np.ndarray) -> tuple[Region, ...]:
-    """The regions of a body that have some of `elements` (m,), by their numbers among these."""
-    regions = []
-    for region in body.momentum.regions:
-        own = np.flatnonzero(np.isin(elements, region.elements))
-        if own.size:
-            regions.append(Region(region.name, own, region.material, region.sink_law))
-    return tuple(regions)
 
 
 def state_of(state: State, part: Numbers) -> State:

@@ -9,6 +9,7 @@ import skfem
 from scipy.sparse import csr_array
 
 from ...errors import ParameterError
+from ...fem.selection import Selection, selected_mesh
 from ...fem.space import Space
 
 __all__ = ["Numbers", "check_ranks", "mesh_of", "numbers", "partition"]
@@ -94,7 +95,4 @@ def numbers(conn: np.ndarray, part: np.ndarray) -> list[Numbers]:
 
 def mesh_of(space: Space, part: Numbers) -> skfem.Mesh:
     """Elements and nodes of a part, of the mesh of the whole body."""
-    here = np.full(space.n_nodes, -1)
-    here[part.nodes] = np.arange(part.nodes.size)
-    return type(space.mesh)(np.ascontiguousarray(space.X[part.nodes].T),
-                            np.ascontiguousarray(here[space.mesh.t[:, part.elements]]))
+    return selected_mesh(space, Selection(part.elements, part.nodes, space.n_elements, space.n_nodes))

@@ -59,11 +59,12 @@ def check_scene(scene: Scene) -> None:
                     place_text(place), SHARP)
     c = scene.controls
     if c.dynamic and c.integrator == "explicit":
-        _check_widths(space, c.explicit.raised_mass)
+        _check_widths(space, max(c.explicit.raised_mass, c.explicit.subcycled))
 
 
 def _check_widths(space: Space, raised: float) -> None:
-    """Elements that cut the explicit step for all others, unless they fill less than the share that gets more mass."""
+    """Elements that cut the explicit step for all others, unless they fill less than the share that gets more mass or
+    short steps of its own."""
     widths = indicators.widths(space)
     typical, e = float(np.median(widths)), int(np.argmin(widths))
     share = float(space.V[widths < NARROW * typical].sum() / space.V.sum())
