@@ -330,7 +330,8 @@ def test_documented_figures_are_those_of_the_file(tmp_path: Path):
     docs = Path(__file__).parents[1] / "docs"
     text = (docs / "speed_accuracy.md").read_text(encoding="utf-8").splitlines()
     for name, part in PARTS.items():
-        file = f"speed_accuracy_{name}.json" if name in ("tolerance", "raised") else "speed_accuracy.json"
+        file = {"time": "", "model": "", "space": "_solvers"}.get(name, f"_{name}")
+        file = f"speed_accuracy{file}.json"
         stored = json.loads((docs / "images" / file).read_text(encoding="utf-8"))
         assert stored["study"] == "speed_accuracy" and stored["machine"]["processor"]
         start = f"{name}/"
