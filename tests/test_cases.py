@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+from skfsink.cases.cylindrical_shell import cylindrical_shell
 from skfsink.cases.symmetric_double_edge_notch import symmetric_double_edge_notch
 from skfsink.results import reference
 from skfsink.results.history import load_name, onset_load
@@ -106,6 +107,25 @@ def test_committed_reference_is_what_a_fresh_run_gives(both: Result) -> None:
         for name in ("U_paper_at_arrival", "D_sink_final"):
             assert fresh["energy"][name] == pytest.approx(old["energy"][name], rel=0.15)
         assert fresh["event"]["max_branches"] == pytest.approx(old["event"]["max_branches"], abs=1)
+
+
+def test_half_of_the_shell_is_the_shell(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Fails if its half, at a fifth of the time, is another body than the whole one, whose figures are stored.
+
+    The onset is the same; cracks amplify rounding, and the two arms of each are those of the whole body.
+    """
+    options = Options(analysis="both", half=True, out=tmp_path_factory.mktemp("runs") / "shell", quiet=True)
+    result = cylindrical_shell(mesh="coarse", options=options)
+    stored = reference.load_coarse("cylindrical_shell")
+    for half in summaries(result):
+        whole, found = stored[half["analysis"]], half["quantities"]
+        assert half["event"]["separated"] and half["whole"]["energy"] == 2.0
+        assert half["onset"]["displacement_mm"] == pytest.approx(whole["onset"]["displacement_mm"], rel=1e-3)
+        assert found["onset_load"] == pytest.approx(onset_load(whole["onset"]), rel=1e-3)
+        assert found["U"] == pytest.approx(whole["energy"]["U_paper_at_arrival"], rel=0.15)
+        assert found["D"] == pytest.approx(whole["energy"]["D_sink_at_arrival"], rel=0.15)
+    dynamic, quasistatic = (half["quantities"]["U"] for half in summaries(result))
+    assert dynamic > 1.1 * quasistatic
 
 
 def test_mirror_symmetric_body_stays_symmetric(tmp_path_factory: pytest.TempPathFactory) -> None:
