@@ -6,6 +6,7 @@ import copy
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
+import meshio
 import numpy as np
 import skfem
 
@@ -19,7 +20,10 @@ from skfsink.loads.nodal import NodalLoads
 from skfsink.loads.schedule import Loading
 from skfsink.material import AAA, Material, SinkLaw
 from skfsink.material.regions import Region
+from skfsink.meshing.sample import _from_meshio
+from skfsink.meshing.sweeping import swept
 from skfsink.methods.controls import StaticsControls
+from skfsink.methods.newton import Newton
 from skfsink.methods.statics import Statics
 
 FAILED = 1.0  # MPa: six times Phi, H = 0
@@ -214,3 +218,22 @@ def greatest_square(momentum: Momentum, pattern: Pattern, free: np.ndarray, u: n
     root = np.sqrt(np.repeat(mass, momentum.space.dim)[free])
     K = pattern.symmetric(momentum.tangent(pattern, u)).toarray() / root / root[:, None]
     return float(np.linalg.eigvalsh(K)[-1])
+
+
+def pulled_sheet_and_slab(section: meshio.Mesh, thickness: float, material: Material
+                          ) -> list[tuple[float, float, np.ndarray]]:
+    """Load of the top, energy and displacement of a sheet in plane stress, and of the slab of two layers on it, pulled
+    by 12 %."""
+    answers = []
+    for mesh, element in ((section, "planestress"), (swept(section, thickness, 2), "jbar")):
+        sample = _from_meshio("plate", mesh)
+        space, free = sample.space, np.ones(sample.space.X.shape, bool)
+        grip = np.union1d(sample.nodes("top"), sample.nodes("bottom"))
+        free[grip, :2] = False
+        free[0, 2:] = False
+        u = np.zeros_like(space.X)
+        u[:, 1] = 0.12 * space.X[:, 1]
+        momentum = Momentum(space, material, element)
+        u, force = Newton(momentum, free.ravel(), 1e-8, 60).equilibrium(u)
+        answers.append((float(force[sample.nodes("top"), 1].sum()), momentum.energy, u))
+    return answers

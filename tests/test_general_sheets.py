@@ -16,6 +16,7 @@ from bodies import (
     momentum_of,
     notched,
     patchy,
+    pulled_sheet_and_slab,
     wavy,
 )
 from plates import plate
@@ -49,8 +50,6 @@ from skfsink.material import (
 from skfsink.material.oriented import AroundALine, oriented
 from skfsink.material.regions import Region
 from skfsink.material.sheet import SheetInvariants
-from skfsink.meshing.sample import _from_meshio
-from skfsink.meshing.sweeping import swept
 from skfsink.methods.controls import HHTControls
 from skfsink.methods.explicit import Explicit
 from skfsink.methods.hht import HHT
@@ -311,20 +310,8 @@ def test_thin_slab_of_solid_elements():
 
     What is left is that of the elements: a quarter of it on elements of half the size.
     """
-    section, thickness, answers = plate(37), 0.1, []
-    material = MooneyRivlin(c1=0.4, c2=0.3)
-    for mesh, element in ((section, "planestress"), (swept(section, thickness, 2), "jbar")):
-        sample = _from_meshio("plate", mesh)
-        space, free = sample.space, np.ones(sample.space.X.shape, bool)
-        grip = np.union1d(sample.nodes("top"), sample.nodes("bottom"))
-        free[grip, :2] = False
-        free[0, 2:] = False
-        u = np.zeros_like(space.X)
-        u[:, 1] = 0.12 * space.X[:, 1]
-        momentum = Momentum(space, material, element)
-        u, force = Newton(momentum, free.ravel(), 1e-8, 60).equilibrium(u)
-        answers.append((float(force[sample.nodes("top"), 1].sum()), momentum.energy, u))
-    (load, energy, u), (load3, energy3, u3) = answers
+    thickness = 0.1
+    (load, energy, u), (load3, energy3, u3) = pulled_sheet_and_slab(plate(37), thickness, MooneyRivlin(c1=0.4, c2=0.3))
     assert load3 / thickness == pytest.approx(load, rel=1e-3)
     assert energy3 / thickness == pytest.approx(energy, rel=1e-3)
     assert abs(u3[1::3, :2] - u).max() < 1e-2 * abs(u).max()

@@ -98,7 +98,7 @@ def body(space: Space, frame: Frame, view: View, colour: np.ndarray | None = Non
     gamma, facets = frame.gamma[space.conn[elements]], FACETS[space.dim]
     value = gamma if colour is None else _held(colour[space.conn[elements]], gamma >= CRACKED)
     if space.dim == 2:
-        edge = outer_facets(space, np.arange(space.n_elements))[elements] & (gamma[:, facets].min(axis=2) >= CRACKED)
+        edge = space.outer_faces[elements][:, _FACES[2]] & (gamma[:, facets].min(axis=2) >= CRACKED)
         faces = np.dstack([x, gamma, np.ones_like(gamma), value])[:, [0, 1, 3, 2]]
         return Body(_triangles(faces), x[:, facets][edge], extent(space, elements, x, gamma))
     x = x @ turned(view).T
