@@ -1,10 +1,11 @@
 """Equilibrium at fixed gamma: Newton's method with an energy line search that finds one however far away it is.
 
-Factorisations are costly and kept: they first serve as they are (modified Newton), then as preconditioner of conjugate
-gradients on the current tangent, until either is slow. Where the tangent is indefinite, as when a piece comes loose
-and turns, the step is taken with a convex one: the pressure in its geometric part is bounded where it would make a
-Gauss point unstable (see :mod:`.kernels.tangent`). That is a second derivative of the potential wherever the body is
-stable, so that the last steps are Newton's.
+Factorisations are costly and kept: they first serve as they are (modified Newton), in space corrected by what the steps
+since have shown of the tangent (:mod:`.secants`), then as preconditioner of conjugate gradients on the current tangent,
+until either is slow. Where the tangent is indefinite, as when a piece comes loose and turns, the step is taken with a
+convex one: the pressure in its geometric part is bounded where it would make a Gauss point unstable (see
+:mod:`.kernels.tangent`). That is a second derivative of the potential wherever the body is stable, so that the last
+steps are Newton's.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from ..fem.pattern import Pattern
 from ..fields.body import Body
 from ..fields.momentum import Momentum
 from .controls import StaticsControls
+from .secants import Secants
 
 __all__ = ["Newton"]
 
@@ -29,9 +31,10 @@ __all__ = ["Newton"]
 class Newton:
     """Finds displacements in equilibrium between grips, at the density and loads last given to `momentum`.
 
-    Memory: factors of a tangent, which later calls use as long as they serve: of which equilibrium within `tolerance`
-    is found, in how many steps, depends on earlier calls to `equilibrium` and `predict`, whether their increments were
-    taken or given up. `memory` gives what they were made from, `factorisations` counts them, `release` drops them.
+    Memory: factors of a tangent, and secants of the steps with them, which later calls use as long as they serve: of
+    which equilibrium within `tolerance` is found, in how many steps, depends on earlier calls to `equilibrium` and
+    `predict`, whether their increments were taken or given up. `memory` gives what they were made from,
+    `restore` makes them again, `factorisations` counts them, `release` drops them.
 
     Parameters
     ----------
@@ -49,6 +52,8 @@ class Newton:
 
     LIVE = 1e-3     # nodes with less than this of their mass are not asked for equilibrium
     KEEP = 0.2      # factors are used as they are while each step with them lowers the residual to this fraction
+    SECANTS = 0, 12  # most of them that correct such steps, in two and in three dimensions
+    PATIENCE = 3    # and such steps that were those of a body far from equilibrium, after which factors are given up
     FAR = 0.5       # far from equilibrium: a step leaves more than this of the residual, or had to be shortened
     INEXACT = 0.02  # relative residual of a step by conjugate gradients, at most
     LEAST_J = 0.05  # of a Gauss point that still carries force; below, a trial is refused
@@ -68,6 +73,7 @@ class Newton:
         # rounding of the stored energy, most in the stiffest one: I1' - 3 is a difference of numbers of order one
         self._noise = 1e-14 * momentum.shear_moduli[1] * float(self.space.V.sum())
         self._kept: tuple[np.ndarray, np.ndarray] | None = None  # displacement and gamma the factors were made at
+        self._secants = Secants(self.SECANTS[self.space.dim - 2])  # of steps with these factors
         self._slow = False  # whether the factors have become too old to be used as they are
         self._spent = 0     # iterations and assemblies since they were made
 
@@ -92,7 +98,9 @@ class Newton:
         force = momentum.force(u)
         energy = momentum.potential
         lowest = min(self.LEAST_J, momentum.least_J)
-        last, length, modified = np.inf, 1.0, False
+        last, length, modified, poor = np.inf, 1.0, False, 0
+        corrected = self.solver.exact and self._secants.most > 0
+        taken: tuple[np.ndarray, np.ndarray] | None = None
         pulled = momentum.load_size(u)
         for _ in range(most):
             r = momentum.unheld(force).ravel()[self.free]
@@ -100,15 +108,19 @@ class Newton:
             if error <= tolerance:
                 return u, force
             self.steps += 1
-            self._slow = self._slow or (modified and error > self.KEEP * last)
-            if length < 1.0 or error > self.FAR * last:
+            if corrected and taken is not None:
+                self._secants.add(taken[0], r - taken[1])
+            far = length < 1.0 or error > self.FAR * last
+            poor = poor + far if modified and corrected else 0
+            if far and not 0 < poor < self.PATIENCE:
                 self._kept = None
+            self._slow = self._slow or (modified and not corrected and error > self.KEEP * last)
             last = error
             modified = self.solver.exact and self._kept is not None and not self._slow
             step, fresh = np.zeros(u.shape), False
             while True:
                 if modified:
-                    d = self._solve(r, momentum.added_stiffness(u, self.free))
+                    d = self._modified(r, momentum.added_stiffness(u, self.free))
                 else:
                     d, fresh = self._direction(u, r, self._inexact(error, tolerance))
                 step.reshape(-1)[self.free] = d
@@ -122,6 +134,7 @@ class Newton:
                 if not modified:
                     self._kept = None
                 modified = False
+            taken = length * d, r
             u += length * step
             if momentum.contact is not None:
                 momentum.contact.place(u)
@@ -160,6 +173,7 @@ class Newton:
             del self.solver
         vars(self).pop("pattern", None)
         self._kept = None
+        self._secants.clear()
 
     # --- directions ---
     def tangent(self, u: np.ndarray, convex: bool = False) -> np.ndarray:
@@ -203,6 +217,10 @@ class Newton:
         self.iterations += iterations
         return d, True
 
+    def _modified(self, r: np.ndarray, added: np.ndarray | None) -> np.ndarray:
+        """A step by factors of an earlier tangent, with what later steps have shown."""
+        return self._secants.solve(self.solver.apply, -r) if added is None else self._solve(r, added)
+
     def _iterate(self, u: np.ndarray, data: np.ndarray, r: np.ndarray, tolerance: float) -> np.ndarray:
         """Solution of K d = -r by conjugate gradients; of a positive definite matrix like K where that curves down."""
         most = self.solver.MOST[self.space.dim - 2]
@@ -245,6 +263,7 @@ class Newton:
     def _factorise(self, u: np.ndarray, data: np.ndarray) -> None:
         """Factors of the tangent at `u`, or of a positive definite matrix like it."""
         self._kept, self._slow, self._spent = (u.copy(), self.momentum.gamma.copy()), False, 0
+        self._secants.clear()
         if self.solver.factorize(data, indefinite=False):
             return
         data = self.tangent(u, convex=True)
@@ -285,7 +304,7 @@ class Newton:
         if self._kept is None:
             return {}
         return {"kept_u": self._kept[0], "kept_gamma": self._kept[1], "slow": np.array(self._slow),
-                "spent": np.array(self._spent)}
+                "spent": np.array(self._spent), **self._secants.memory()}
 
     def restore(self, memory: dict[str, np.ndarray]) -> None:
         """Make the factors again; the density of `momentum` is left as it is."""
@@ -297,3 +316,4 @@ class Newton:
         self._factorise(memory["kept_u"], self.tangent(memory["kept_u"]))
         momentum.gamma = gamma
         self._slow, self._spent = bool(memory["slow"]), int(memory["spent"])
+        self._secants.restore(memory)
