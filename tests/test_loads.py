@@ -436,10 +436,13 @@ def test_a_hanging_body_bears_its_weight(kind: str) -> None:
         for _ in statics.load(state):
             if state.grip >= 10.0:
                 break
-        held = momentum.force(state.u)[side(space, f"{up}+")].sum(axis=0)
         expected = np.zeros(space.dim)
         expected[-1] = force * state.grip  # a box of side 1
-        np.testing.assert_allclose(held, expected, atol=1e-5 * force * state.grip)  # what a first pass may leave
+        top = side(space, f"{up}+")
+        settled = statics.equilibrium(state.u)[0]  # a first pass of the loading may leave more, up to 1e-5
+        for u, left in ((state.u, 1e-5), (settled, 1e-6)):
+            held = momentum.force(u)[top].sum(axis=0)
+            np.testing.assert_allclose(held, expected, atol=left * force * state.grip)
         assert abs(state.ledger.balance) < 5e-3 * state.ledger.elastic and state.ledger.loads < 0
 
 
