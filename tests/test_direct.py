@@ -106,6 +106,30 @@ def test_released_factors_are_made_again():
     np.testing.assert_array_equal(solver.solve(b), x)
 
 
+def test_factorisations_do_not_share_anything_but_the_library(monkeypatch: pytest.MonkeyPatch):
+    """Fails if one solver uses the factors of another, or if each of them looks for MKL again, for a third of a second.
+    """
+    pypardiso = pytest.importorskip("pypardiso")
+    made: list[Any] = []
+    original = pypardiso.PyPardisoSolver
+
+    def wrapper() -> Any:
+        made.append(original())
+        return made[-1]
+
+    monkeypatch.setattr(pypardiso, "PyPardisoSolver", wrapper)
+    direct._library.cache_clear()
+    solvers, alone = [], []
+    for n in (4, 5, 6):
+        momentum, pattern = body(box("quad", n))
+        solvers.append(Factorization(pattern))
+        solvers[-1].factorize(momentum.tangent(pattern, np.zeros_like(momentum.space.X)))
+        alone.append(solvers[-1].apply(np.ones(pattern.size)))
+    for solver, expected in zip(reversed(solvers), reversed(alone)):
+        np.testing.assert_array_equal(solver.apply(np.ones(solver.pattern.size)), expected)
+    assert len(made) == 1
+
+
 def test_each_factorisation_has_its_own_number_of_threads(space: Space):
     """Fails if the number of threads is that of the solver made last, which is one for the whole process in MKL."""
     pypardiso = pytest.importorskip("pypardiso")

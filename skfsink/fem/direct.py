@@ -10,6 +10,8 @@ import math
 import os
 from collections.abc import Callable
 from contextlib import AbstractContextManager
+from copy import copy
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -208,6 +210,12 @@ class Factorization:
         return self._handles[kind]
 
 
+@cache
+def _library() -> Any:
+    """The wrapper of PARDISO as it is made: once, since its search for MKL takes a third of a second."""
+    return pypardiso.PyPardisoSolver()
+
+
 class _Pardiso:
     """MKL's PARDISO on one pattern: `kind` 2 for positive definite, -2 for indefinite symmetric matrices."""
 
@@ -217,8 +225,8 @@ class _Pardiso:
     def __init__(self, pattern: Pattern, kind: int, threads: int) -> None:
         self._pattern, self._kind, self._data = pattern, kind, np.zeros(pattern.nnz)
         self._threads = threads
-        self._handle = handle = pypardiso.PyPardisoSolver(mtype=kind)
-        handle.iparm[:] = 0
+        self._handle = handle = copy(_library())
+        handle.pt, handle.iparm = np.zeros_like(handle.pt), np.zeros_like(handle.iparm)
         handle.iparm[0] = 1       # the values below, none by default
         handle.iparm[1] = 2       # nested dissection
         handle.iparm[9] = 8       # pivots below 1e-8 are perturbed (indefinite)
