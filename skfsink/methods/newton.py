@@ -23,6 +23,7 @@ from ..fem.pattern import Pattern
 from ..fields.body import Body
 from ..fields.momentum import Momentum
 from .controls import StaticsControls
+from .nearby import CLOSER, Nearby
 from .secants import Secants
 
 __all__ = ["Newton"]
@@ -58,6 +59,7 @@ class Newton:
     INEXACT = 0.02  # relative residual of a step by conjugate gradients, at most
     LEAST_J = 0.05  # of a Gauss point that still carries force; below, a trial is refused
     SHORTEST = 1e-6  # step length at which a direction is given up
+    NEARBY = True    # whether equilibria are sought nearby first, where it is asked for
     RIM = 60         # iterations of GMRES, for the rim of a pressurised surface
 
     def __init__(self, momentum: Momentum, free: np.ndarray, tolerance: float, most: int, threads: int = 1, *,
@@ -83,9 +85,12 @@ class Newton:
         return cls(body.momentum, body.free, controls.tolerance, controls.max_newton, body.threads,
                    linear=controls.linear)
 
-    def equilibrium(self, u: np.ndarray, tolerance: float | None = None,
-                    most: int | None = None) -> tuple[np.ndarray, np.ndarray]:
+    def equilibrium(self, u: np.ndarray, tolerance: float | None = None, most: int | None = None,
+                    nearby: bool = False) -> tuple[np.ndarray, np.ndarray]:
         """Displacement in equilibrium at the current gamma, from the guess `u` with the grips in place, and its force.
+
+        With `nearby` what is around the elements whose gamma has changed is brought to equilibrium first, in turn with
+        steps of the whole body, where that serves (see :mod:`.nearby`).
 
         Raises
         ------
@@ -102,9 +107,19 @@ class Newton:
         corrected = self.solver.exact and self._secants.most > 0
         taken: tuple[np.ndarray, np.ndarray] | None = None
         pulled = momentum.load_size(u)
+        near = self._nearby() if nearby and corrected else None
         for _ in range(most):
             r = momentum.unheld(force).ravel()[self.free]
-            error = float(np.linalg.norm(r[live]) / (np.linalg.norm(force) + self._least_force + pulled))
+            error = float(np.linalg.norm(r[live])) / (self.scale(force) + pulled)
+            if near is not None and error > tolerance:
+                way = near.relax(u, max(CLOSER * error, tolerance) * self.scale(force))
+                if way is None:
+                    near = None
+                else:
+                    taken = taken and (taken[0] + way.ravel()[self.free], taken[1])
+                    force = momentum.force(u, force)
+                    energy, r = momentum.potential, force.ravel()[self.free]
+                    error = float(np.linalg.norm(r[live])) / self.scale(force)
             if error <= tolerance:
                 return u, force
             self.steps += 1
@@ -113,7 +128,7 @@ class Newton:
             far = length < 1.0 or error > self.FAR * last
             poor = poor + far if modified and corrected else 0
             if far and not 0 < poor < self.PATIENCE:
-                self._kept = None
+                self._kept = near = None
             self._slow = self._slow or (modified and not corrected and error > self.KEEP * last)
             last = error
             modified = self.solver.exact and self._kept is not None and not self._slow
@@ -133,13 +148,29 @@ class Newton:
                 self._slow = True
                 if not modified:
                     self._kept = None
-                modified = False
+                modified, near = False, None
             taken = length * d, r
             u += length * step
             if momentum.contact is not None:
                 momentum.contact.place(u)
             energy = momentum.potential
         raise ConvergenceError(f"no equilibrium within {most} Newton steps")
+
+    def alike(self, momentum: Momentum, free: np.ndarray, most: int) -> Newton:
+        """The same for another body."""
+        return Newton(momentum, free, self.tolerance, most, self._threads, linear=self._linear)
+
+    def scale(self, force: np.ndarray) -> float:
+        """What a residual is compared with: the norm of the forces (n, dim) of all nodes, and a least force [N]."""
+        return float(np.linalg.norm(force)) + self._least_force
+
+    def _nearby(self) -> Nearby | None:
+        """What is around the elements that have changed since the factors were made, of a body between grips alone."""
+        momentum = self.momentum
+        others = (momentum.dead, momentum.followers, momentum.contact, momentum.sliding)
+        if not self.NEARBY or self._kept is None or any(other is not None for other in others):
+            return None
+        return Nearby.of(self, self._kept[1])
 
     def predict(self, u: np.ndarray, move: np.ndarray) -> np.ndarray:
         """`u` after the grips have moved by `move` (n, dim; zero at free nodes), to first order in it."""

@@ -104,7 +104,7 @@ class Statics(StaticLoading):
     def _relax(self, state: State) -> np.ndarray:
         """The equilibrium of a pass; the history follows equilibria only, or the sink would kill the mesh."""
         try:
-            return self.newton.equilibrium(state.u, most=self.SNAP)[0]
+            return self.newton.equilibrium(state.u, most=self.SNAP, nearby=True)[0]
         except ConvergenceError as error:
             cure = "take another mesh, or analysis = 'dynamic'"
             dead, followers = self.momentum.dead, self.momentum.followers

@@ -50,6 +50,8 @@ class NewtonInParts(Newton):
     `release`: the `solver` of the last one.
     """
 
+    NEARBY = False  # the parts that the ranks have are of the whole body
+
     def lead(self, body: Body, crew: Crew) -> None:
         """Take the ranks for the body."""
         self._body, self.crew = body, crew
