@@ -106,6 +106,20 @@ def test_released_factors_are_made_again():
     np.testing.assert_array_equal(solver.solve(b), x)
 
 
+def test_factors_of_a_solver_that_is_gone_are_freed(monkeypatch: pytest.MonkeyPatch):
+    """Fails if each of many small solvers leaves its factors in memory."""
+    pytest.importorskip("pypardiso")
+    phases: list[int] = []
+    monkeypatch.setattr(direct._Pardiso, "_call", lambda self, phase, *others, plain=direct._Pardiso._call:
+                        (phases.append(phase), plain(self, phase, *others))[1])
+    momentum, pattern = body(box("hex", 3))
+    solver = Factorization(pattern)
+    solver.factorize(momentum.tangent(pattern, np.zeros_like(momentum.space.X)))
+    assert direct._Pardiso.RELEASE not in phases
+    del solver
+    assert phases[-1] == direct._Pardiso.RELEASE
+
+
 def test_factorisations_do_not_share_anything_but_the_library(monkeypatch: pytest.MonkeyPatch):
     """Fails if one solver uses the factors of another, or if each of them looks for MKL again, for a third of a second.
     """

@@ -8,6 +8,7 @@ from __future__ import annotations
 import ctypes
 import math
 import os
+import sys
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from copy import copy
@@ -193,8 +194,6 @@ class Factorization:
 
     def release(self) -> None:
         """Free the memory of the factors."""
-        for handle in self._handles.values():
-            handle.release()
         self._handles.clear()
         self._lu = self._cholesky = None
 
@@ -217,7 +216,10 @@ def _library() -> Any:
 
 
 class _Pardiso:
-    """MKL's PARDISO on one pattern: `kind` 2 for positive definite, -2 for indefinite symmetric matrices."""
+    """MKL's PARDISO on one pattern: `kind` 2 for positive definite, -2 for indefinite symmetric matrices.
+
+    MKL's memory is freed with the object.
+    """
 
     ANALYSE, FACTORIZE, SOLVE, RELEASE = 11, 22, 33, -1
     NOT_DEFINITE = -4
@@ -247,8 +249,9 @@ class _Pardiso:
         self._call(self.SOLVE, columns, x)
         return x.T
 
-    def release(self) -> None:
-        self._call(self.RELEASE)
+    def __del__(self) -> None:
+        if "_empty" in vars(self) and not sys.is_finalizing():
+            self._call(self.RELEASE)
 
     def _call(self, phase: int, b: np.ndarray | None = None, x: np.ndarray | None = None) -> int:
         handle, pattern = self._handle, self._pattern
