@@ -191,13 +191,22 @@ def at_onset(space: Space, speed: float = 1e-3, overshoot: float = 0.01, regions
     return Fracture(lambda: copy.deepcopy(state), momentum, density, free, velocity)
 
 
-def momentum_of(space: Space, material: Material, gamma: np.ndarray, element: str = "jbar",
-                regions: Sequence[Region] = (), threads: int = 1) -> Momentum:
-    """The momentum balance at the relative density `gamma` (ne, nq) of the Gauss points."""
-    momentum = Momentum(space, material, element, regions=regions, threads=threads)
+def pulled(space: Space, law: SinkLaw, **controls: Any) -> Loadable:
+    """A body whose ends are moved apart by 1e-3 mm/s each."""
+    return Loadable(space, Loading.steady(space, *grips(space, 1e-3)), AAA(), law, **controls)
+
+
+def at_density(momentum: Momentum, gamma: np.ndarray) -> Momentum:
+    """The momentum balance, at the relative density `gamma` (ne, nq) of the Gauss points from now on."""
     momentum.gamma = gamma
     momentum.backend.set_gamma(gamma)
     return momentum
+
+
+def momentum_of(space: Space, material: Material, gamma: np.ndarray, element: str = "jbar",
+                regions: Sequence[Region] = (), threads: int = 1) -> Momentum:
+    """The momentum balance at the relative density `gamma` (ne, nq) of the Gauss points."""
+    return at_density(Momentum(space, material, element, regions=regions, threads=threads), gamma)
 
 
 def same_bits(one: State, other: State) -> None:

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bodies import close, distorted, grid, grips, held_body, momentum_of, same_bits, wavy
+from bodies import at_density, close, distorted, grid, grips, momentum_of, pulled, same_bits, wavy
 
 from skfsink.fem.space import Space
-from skfsink.fields.density import DensitySolver
 from skfsink.fields.momentum import Momentum
 from skfsink.fields.state import State
 from skfsink.material import AAA, Material, SinkLaw
 from skfsink.material.fibres import HolzapfelGasserOgden
 from skfsink.material.regions import Region
-from skfsink.methods.controls import StaticsControls
 from skfsink.methods.nearby import LAYERS, Nearby
 from skfsink.methods.newton import Newton
 from skfsink.methods.statics import Statics
@@ -93,8 +91,7 @@ def test_no_equilibrium_nearby_leaves_the_body_as_it_was(monkeypatch: pytest.Mon
     for gives_up in (False, True):
         whole = newton_of(Momentum(space, AAA()))
         whole.equilibrium(start * 0.999)
-        whole.momentum.backend.set_gamma(gamma)
-        whole.momentum.evaluate_by(whole.momentum.backend)
+        at_density(whole.momentum, gamma)
         if gives_up:
             monkeypatch.setattr("skfsink.methods.nearby.STEPS", 1)
             near = Nearby.of(whole, np.ones_like(space.w))
@@ -113,8 +110,7 @@ def test_secants_are_of_the_whole_way(monkeypatch: pytest.MonkeyPatch):
     gamma[elements_at(space, 0.9, 1.0)] = 0.3
     whole = newton_of(Momentum(space, AAA()))
     start, _ = whole.equilibrium(stretched(space))
-    whole.momentum.backend.set_gamma(gamma)
-    whole.momentum.evaluate_by(whole.momentum.backend)
+    at_density(whole.momentum, gamma)
     monkeypatch.setattr(Nearby, "relax", lambda self, u, force, plain=Nearby.relax:
                         (plain(self, u, force), ways.append(u.ravel()[whole.free]))[0])
     whole._secants.clear()
@@ -145,24 +141,13 @@ def test_only_a_small_part_of_a_body_is_nearby(where: tuple[float, float, float]
 
 # --- in statics ---
 def statics_of(space: Space) -> Statics:
-    free, velocity = grips(space, 1e-3)
-    return Statics(held_body(Momentum(space, AAA()), DensitySolver(space, SinkLaw(length_scale=0.1)), free, velocity),
-                   StaticsControls(tolerance=1e-8))
+    return pulled(space, SinkLaw(length_scale=0.1), tolerance=1e-8).statics
 
 
 @pytest.fixture(scope="module")
 def onset() -> State:
     """The slab at its onset."""
-    space = slab()
-    state = State.intact(space)
-    for _ in statics_of(space).load(state):
-        pass
-    return state
-
-
-def copied(state: State) -> State:
-    arrays, values = state.stored()
-    return State.restored({name: array.copy() for name, array in arrays.items()}, values)
+    return pulled(slab(), SinkLaw(length_scale=0.1), tolerance=1e-8).load()
 
 
 def passes(statics: Statics, state: State, count: int) -> State:
@@ -179,7 +164,7 @@ def test_a_crack_runs_as_without(onset: State, monkeypatch: pytest.MonkeyPatch):
                         (way := plain(self, u, force), relaxed.append(way is not None))[0])
     for nearby in (False, True):
         monkeypatch.setattr(Newton, "NEARBY", nearby)
-        state, statics = copied(onset), statics_of(space)
+        state, statics = onset.copy(), statics_of(space)
         state.begin_event(0.005)
         found.append((passes(statics, state, 25), statics.factorisations))
         assert bool(relaxed) == nearby
@@ -196,7 +181,7 @@ def test_a_crack_runs_as_without(onset: State, monkeypatch: pytest.MonkeyPatch):
 def test_passes_resume_to_the_same_bits(onset: State):
     """Fails if something nearby is remembered from one pass to the next, beyond what a checkpoint holds."""
     space = slab()
-    states = [copied(onset), copied(onset)]
+    states = [onset.copy(), onset.copy()]
     for state in states:
         state.begin_event(0.005)
     passes(statics_of(space), states[0], 12)

@@ -298,12 +298,10 @@ def test_plates_beside_bodies_in_space_keep_their_units() -> None:
     """Fails if energies in N mm/mm and in N mm stand in one column without saying which is which."""
     folders = [data_folder(case) / "reference" / key for case, key in (
         ("single_edge_notch", "M3-dynamic"), ("dog_bone", "paper-quasistatic"))]
-    results = [skfsink.load(folder) for folder in folders]
-    text = report_page(results)
+    text = report_page([skfsink.load(folder) for folder in folders])
     checked(text)
     row = re.search(r'<th scope="row">U at the first arrival</th>(.*?)</tr>', text)
-    U = results[0].summary["energy"]["U_paper_at_arrival"]
-    assert row and re.findall(r"([\d.]+ N mm(?:/mm)?)<", row[1])[0] == f"{U:.4g} N mm/mm"
+    assert row and re.findall(r"([\d.]+ N mm(?:/mm)?)<", row[1])[0] == "0.06373 N mm/mm"
     assert row[1].count(" N mm<") == 1
     assert text.count("the folder holds no pictures") == 2
 

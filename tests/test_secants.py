@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bodies import grid, grips, held_body, same_bits
+from bodies import grid, pulled, same_bits
 
 from skfsink.fem.space import Space
-from skfsink.fields.density import DensitySolver
-from skfsink.fields.momentum import Momentum
 from skfsink.fields.state import State
-from skfsink.material import AAA, SinkLaw
-from skfsink.methods.controls import StaticsControls
+from skfsink.material import SinkLaw
 from skfsink.methods.newton import Newton
 from skfsink.methods.secants import Secants
 from skfsink.methods.statics import Statics
@@ -84,10 +81,7 @@ def block() -> Space:
 
 
 def statics_of(space: Space) -> Statics:
-    free, velocity = grips(space, 1e-3)
-    momentum = Momentum(space, AAA())
-    return Statics(held_body(momentum, DensitySolver(space, SinkLaw(length_scale=0.4)), free, velocity),
-                   StaticsControls())
+    return pulled(space, SinkLaw(length_scale=0.4)).statics
 
 
 def loaded(statics: Statics, steps: int = 1000, with_secants: bool = False) -> State:

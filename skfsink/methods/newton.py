@@ -108,18 +108,21 @@ class Newton:
         taken: tuple[np.ndarray, np.ndarray] | None = None
         pulled = momentum.load_size(u)
         near = self._nearby() if nearby and corrected else None
-        for _ in range(most):
+
+        def residual(force: np.ndarray) -> tuple[np.ndarray, float]:
             r = momentum.unheld(force).ravel()[self.free]
-            error = float(np.linalg.norm(r[live])) / (self.scale(force) + pulled)
+            return r, float(np.linalg.norm(r[live])) / (self.scale(force) + pulled)
+
+        for _ in range(most):
+            r, error = residual(force)
             if near is not None and error > tolerance:
                 way = near.relax(u, max(CLOSER * error, tolerance) * self.scale(force))
                 if way is None:
                     near = None
                 else:
                     taken = taken and (taken[0] + way.ravel()[self.free], taken[1])
-                    force = momentum.force(u, force)
-                    energy, r = momentum.potential, force.ravel()[self.free]
-                    error = float(np.linalg.norm(r[live])) / self.scale(force)
+                    r, error = residual(momentum.force(u, force))
+                    energy = momentum.potential
             if error <= tolerance:
                 return u, force
             self.steps += 1
@@ -164,14 +167,6 @@ class Newton:
         """What a residual is compared with: the norm of the forces (n, dim) of all nodes, and a least force [N]."""
         return float(np.linalg.norm(force)) + self._least_force
 
-    def _nearby(self) -> Nearby | None:
-        """What is around the elements that have changed since the factors were made, of a body between grips alone."""
-        momentum = self.momentum
-        others = (momentum.dead, momentum.followers, momentum.contact, momentum.sliding)
-        if not self.NEARBY or self._kept is None or any(other is not None for other in others):
-            return None
-        return Nearby.of(self, self._kept[1])
-
     def predict(self, u: np.ndarray, move: np.ndarray) -> np.ndarray:
         """`u` after the grips have moved by `move` (n, dim; zero at free nodes), to first order in it."""
         eps = 1e-6 * float(self.space.h.min()) / (np.abs(move).max() + 1e-300)
@@ -210,6 +205,14 @@ class Newton:
     def tangent(self, u: np.ndarray, convex: bool = False) -> np.ndarray:
         """The tangent at `u`, as the solver takes it."""
         return self.momentum.tangent(self.pattern, u, convex)
+
+    def _nearby(self) -> Nearby | None:
+        """What is around the elements that have changed since the factors were made, of a body between grips alone."""
+        momentum = self.momentum
+        others = (momentum.dead, momentum.followers, momentum.contact, momentum.sliding)
+        if not self.NEARBY or self._kept is None or any(other is not None for other in others):
+            return None
+        return Nearby.of(self, self._kept[1])
 
     def _live(self) -> np.ndarray:
         live: np.ndarray = self.space.lump(self.momentum.gamma) > self.LIVE * self._volume
