@@ -32,6 +32,7 @@ from ..fields.deletion import delete_debris, delete_failed, left_in
 from ..fields.density import Density
 from ..fields.state import State
 from .controls import EventControls, ExplicitControls
+from .looked import OneBody
 from .nodal_steps import half_square, kick, move, viscous_work
 from .raised_mass import raised_mass, small_elements
 from .solve_interval import SolveInterval
@@ -41,7 +42,7 @@ from .subcycling import Subcycling
 __all__ = ["Explicit"]
 
 
-class Explicit:
+class Explicit(OneBody):
     """Integrates a :class:`State` from onset on.
 
     Memory: step size and frequency estimate, forces, masses, the history in tiles, and active zones, all of the state

@@ -32,13 +32,14 @@ from ..fields.state import State
 from .controls import EventControls, HHTControls
 from .hht_ledger import Balance, book_motion, book_sink, book_viscous
 from .hht_trial import Scheme, Trial
+from .looked import OneBody
 
 __all__ = ["HHT"]
 
 log = logging.getLogger(__name__)
 
 
-class HHT:
+class HHT(OneBody):
     """Integrates a :class:`State`; see the module for the scheme.
 
     Memory: step size and the terms of the balances at the last accepted state: after `begin`, `start` or `restore`,

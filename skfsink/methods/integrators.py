@@ -12,11 +12,12 @@ from ..fields.state import State
 from .controls import EventControls
 from .explicit import Explicit
 from .hht import HHT
+from .looked import Looked
 
 __all__ = ["INTEGRATORS", "Integrator"]
 
 
-class Integrator(Protocol):
+class Integrator(Looked, Protocol):
     """What a run asks of an integrator: it advances a :class:`.State` in place."""
 
     @classmethod

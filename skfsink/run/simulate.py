@@ -17,7 +17,7 @@ from ..fields.body import Body
 from ..fields.frame_fields import ON_REQUEST, asked_fields
 from ..fields.state import State
 from ..methods.integrators import Integrator
-from ..methods.ranks.integrator import InParts, RankOptions, integrator_of
+from ..methods.ranks.integrator import RankOptions, integrator_of
 from ..methods.ranks.statics import statics_of
 from ..methods.rest import LoadingFromRest
 from ..methods.statics import Statics
@@ -276,17 +276,15 @@ class Simulation:
     # --- costs and checkpoints ---
     def cost(self) -> dict[str, Any]:
         """Wall times and counts since the run began, over all its sessions."""
-        stepping, rejected, others, ranks = 0, 0, 0, {}
-        if isinstance(self.integrator, InParts):
-            others, ranks = self.integrator.solves, {"ranks": self.integrator.cost()}
+        stepping, rejected, looked = 0, 0, self.view.looked
         if self.integrator is not None:
             stepping = self.integrator.factorisations
             rejected = self.integrator.rejected if self.state.phase != "loading" else 0
         factorisations = (self.costs.factorisations + self.statics.factorisations + self.density.factorisations
                           + stepping)
         return {"wall": dict(self.costs.wall), "steps": self.costs.steps, "rejected_steps": rejected,
-                "gamma_solves": self.costs.gamma_solves + self.density.solves + others,
-                "factorisations": factorisations, **ranks}
+                "gamma_solves": self.costs.gamma_solves + self.density.solves + looked.solves,
+                "factorisations": factorisations, **looked.cost()}
 
     def _save(self) -> None:
         self.costs.lap(self.state.phase)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from ...fields.body import Body, BodyScene
 from ...fields.state import State
 from ..controls import EventControls
 from ..integrators import INTEGRATORS, Integrator
+from ..looked import Pieces
 from .crew import Crew
 from .gathered import Gathered
 from .part import check_parts, parts_of
@@ -24,7 +25,6 @@ from .world import world
 
 __all__ = ["InParts", "RankOptions", "integrator_of", "ranks_text", "refuse"]
 
-T = TypeVar("T")
 MOVING, DENSITY = ("u", "v", "a", "W_max"), ("gamma", "sink")
 NODAL = {"reaction", "viscous"}  # of the memory of an integrator
 
@@ -153,26 +153,27 @@ class InParts:
         """Solves for gamma in the parts."""
         return self._own.density.solves
 
-    def stress(self) -> np.ndarray:
+    @property
+    def pieces(self) -> Pieces | None:
+        """Those of the ranks, if these write frames in pieces."""
+        return Pieces(self.crew.size, self.crew.each) if self.options.frame_pieces else None
+
+    def stress(self, state: State) -> np.ndarray:
         """Mean Cauchy stress of the elements [MPa], (ne, 6), as the parts find it."""
         return self._fetch("stress")
 
-    def crushed(self) -> np.ndarray:
+    def crushed(self, state: State) -> np.ndarray:
         """Mask of the elements that no stress is defined for, (ne,)."""
         return self._fetch("crushed")
 
-    def each(self, function: Callable[..., T], *arguments: Any) -> T:
-        """See :meth:`.Crew.each`."""
-        return self.crew.each(function, *arguments)
-
     def cost(self) -> dict[str, Any]:
-        """What each rank has used of memory [MB], and how often they have told each other something.
+        """`ranks`: what each has used of memory [MB], and how often they have told each other something.
 
         `halos` are sums at the nodes between parts, `sums` numbers that all parts give.
         """
         exchange = self.crew.member.exchange
-        return {"peak_rss_mb": [round(peak, 1) for peak in self.crew.peaks()], "halos": exchange.halos,
-                "sums": exchange.sums_made, "gamma_iterations": self._own.density.iterations}
+        return {"ranks": {"peak_rss_mb": [round(peak, 1) for peak in self.crew.peaks()], "halos": exchange.halos,
+                          "sums": exchange.sums_made, "gamma_iterations": self._own.density.iterations}}
 
     def begin(self, state: State) -> None:
         """Set the body in motion."""

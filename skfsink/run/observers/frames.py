@@ -13,7 +13,6 @@ from ...fields.momentum import Momentum
 from ...fields.state import State
 from ...fields.stress import cauchy_stress, pressure, von_mises
 from ...methods.ranks.crew import Member
-from ...methods.ranks.integrator import InParts
 from ...results.frame import ELEMENT, NODE
 from ...results.series import Series, frame_mesh, write_piece
 from ...system.files import prepare_folder
@@ -98,10 +97,10 @@ class Frames(Observer):
         self._add(self.series, view)
 
     def _add(self, series: Series, view: View) -> None:
-        state, parts = view.state, view.integrator
-        if isinstance(parts, InParts) and parts.options.frame_pieces:
-            series.add_pieces(state.time, parts.crew.size,
-                              lambda folder: parts.each(_write_piece, folder, self.fields, self._still))
+        state, pieces = view.state, view.looked.pieces
+        if pieces is not None:
+            series.add_pieces(state.time, pieces.number,
+                              lambda folder: pieces.each(_write_piece, folder, self.fields, self._still))
             view.framed = True
             return
         series.add(state.time, *_fields(view.body.momentum, state, view.stress, self.fields, self._still))

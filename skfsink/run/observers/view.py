@@ -12,9 +12,8 @@ import numpy as np
 from ...fields.body import Body
 from ...fields.crack import CrackTracker, Tips
 from ...fields.state import State
-from ...fields.stress import cauchy_stress
 from ...methods.integrators import Integrator
-from ...methods.ranks.integrator import InParts
+from ...methods.looked import Looked, OneBody
 from ...scene.scene import Scene
 from .gauge import Gauge
 
@@ -112,12 +111,15 @@ class View:
         return "pass" if self.quasistatic else "s"
 
     @property
+    def looked(self) -> Looked:
+        """What knows the stress of the body: the integrator, if there is one."""
+        return OneBody(self.body) if self.integrator is None else self.integrator
+
+    @property
     def stress(self) -> np.ndarray:
         """Mean Cauchy stress of the elements [MPa], (ne, 6); see :func:`.cauchy_stress`."""
         if self._stress is None:
-            parts = self.integrator
-            self._stress = parts.stress() if isinstance(parts, InParts) else cauchy_stress(self.body.momentum,
-                                                                                           self.state.u)
+            self._stress = self.looked.stress(self.state)
         return self._stress
 
     @property
@@ -128,10 +130,8 @@ class View:
     @property
     def crushed(self) -> np.ndarray:
         """Mask of the elements that no stress is defined for, (ne,)."""
-        parts = self.integrator
-        if self._stress is None and isinstance(parts, InParts):
-            return parts.crushed()
-        mask: np.ndarray = np.isnan(self.stress).any(axis=1)
+        known = self.looked.crushed(self.state) if self._stress is None else None
+        mask: np.ndarray = np.isnan(self.stress).any(axis=1) if known is None else known
         return mask
 
     @property
