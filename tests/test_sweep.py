@@ -107,6 +107,26 @@ def test_the_length_of_a_crack_varies() -> None:
         read_variation("cut.points=1,2", deck)
 
 
+def test_a_number_of_one_of_several_tables_varies() -> None:
+    """Fails if the angle of one layer of fibres changes that of another, or a layer is taken that was not named."""
+    layers = {"region": "media", "azimuth": 30.0}, {"region": "adventitia", "azimuth": 60.0}
+    deck = Deck("custom", {"mesh": "a.vtu", "fibres": layers})
+    found = read_variation("fibres.2.azimuth=0..90:3", deck)
+    assert (found.name, found.what.unit, found.values) == ("fibres.2.azimuth", "degree", [0.0, 45.0, 90.0])
+    assert with_values([found], {found.name: 45.0}, deck.parameters)["fibres"] == (
+        layers[0], {"region": "adventitia", "azimuth": 45.0})
+    for name, said in (("fibres.azimuth", "has 2 tables [[fibres]]: say which, fibres.1.azimuth to fibres.2.azimuth"),
+                       ("fibres.0.azimuth", "say which"), ("fibres.3.azimuth", "say which"),
+                       ("fibres.media.azimuth", "say which"), ("fibres.1.array", "numbers of fibres are azimuth")):
+        with pytest.raises(ParameterError) as error:
+            read_variation(f"{name}=1,2", deck)
+        assert said in str(error.value), error.value
+    one = Deck("custom", {"mesh": "a.vtu", "fibres": layers[:1]})
+    assert read_variation("fibres.1.azimuth=1,2", one).values == read_variation("fibres.azimuth=1,2", one).values
+    with pytest.raises(ParameterError, match=r"has 1 table \[\[fibres\]\]: it is fibres.azimuth"):
+        read_variation("fibres.2.azimuth=1,2", one)
+
+
 @pytest.mark.parametrize(("text", "said"), [
     ("mu=1,2", "constants of hgo are c, k1, k2, kappa, angle, axis, normal"), ("axis=1,2", "it is a vector"),
     ("core.1.k2=1,2", "numbers of regions are phi, m, bulk_modulus, density, viscosity"),

@@ -38,11 +38,12 @@ class Varied:
 
 
 def varied(name: str, deck: Deck) -> Varied:
-    """The quantity of a deck that is called NAME, CONSTANT, REGION.CONSTANT, CRACK.FIELD or TABLE.FIELD.
+    """The quantity of a deck that is called NAME, CONSTANT, REGION.CONSTANT, CRACK.FIELD, TABLE.FIELD or TABLE.N.FIELD.
 
     NAME is a parameter of its case, with - or . for _; CONSTANT one of its law, or E, G or nu; REGION a region of it,
     which also has the fields phi, m, bulk_modulus, density and viscosity; CRACK an initial
-    crack, by its name, with the fields length and width; TABLE a kind of tables of which it has one, such as fibres.
+    crack, by its name, with the fields length and width; TABLE a kind of tables, such as fibres, of which N is the
+    first (1) or a later one: where the deck has several, it must be said which.
 
     Raises
     ------
@@ -66,8 +67,9 @@ def varied(name: str, deck: Deck) -> Varied:
     cracks: Sequence[Any] = deck.parameters.get("cracks", ())
     if dot and (found := [i for i, table in enumerate(cracks) if table["name"] == head]):
         return _of_table(name, "cracks", found[0], tail)
-    if dot and len(deck.parameters.get(head, ())) == 1 and head in case.tables:
-        return _of_table(name, head, 0, tail)
+    kind, _, which = head.partition(".")
+    if kind in case.tables and (tables := deck.parameters.get(kind, ())):
+        return _of_table(name, kind, _which(name, kind, which, tail, len(tables)), tail)
     others = f"; constants of {law} are {', '.join(constants)}" if constants else ""
     raise ParameterError(f"--vary {plain if not dot else name}: there is no such parameter; `skfsink show CASE` lists "
                          f"them{others}")
@@ -100,6 +102,16 @@ def _quantity(name: str, law: str) -> Callable[[Any], Any]:
         return float(number_in(name, value, constant_unit(name)))
 
     return read
+
+
+def _which(name: str, kind: str, which: str, field: str, count: int) -> int:
+    """Number of a table from zero, from its number from one; none is needed for the only one."""
+    if not which and count == 1:
+        return 0
+    if not which.isdecimal() or not 1 <= int(which) <= count:
+        of = f"say which, {kind}.1.{field} to {kind}.{count}.{field}" if count > 1 else f"it is {kind}.{field}"
+        raise ParameterError(f"--vary {name}: the deck has {count} table{'s' * (count > 1)} [[{kind}]]: {of}")
+    return int(which) - 1
 
 
 def _of_table(name: str, kind: str, number: int, field: str) -> Varied:
