@@ -18,6 +18,7 @@ from skfsink.material import AAA, SinkLaw
 from skfsink.material.regions import Region
 from skfsink.methods.controls import ExplicitControls
 from skfsink.methods.explicit import Explicit
+from skfsink.methods.raised_mass import small_elements
 from skfsink.methods.ranks.part import check_parts
 from skfsink.methods.subcycling import Subcycling, check_subcycling
 from skfsink.scene.controls import Controls
@@ -288,7 +289,7 @@ def test_small_elements_and_their_neighbours_are_fast() -> None:
     regions = (Region("left", stiff, AAA(c1=0.7), SinkLaw()),)
     momentum = Momentum(space, AAA(), regions=regions)
     free = ~boundary(space)[:, None] & np.ones(space.dim, bool)
-    found = Subcycling(momentum, free, ExplicitControls(raised_mass=0.0, subcycled=share(space)), 1.0)
+    found = Subcycling(momentum, small_elements(momentum, share(space)), free, ExplicitControls(), 1.0)
     thin_ones = 0.5 * space.V.max() > space.V
     assert thin_ones[found.elements].sum() == thin_ones.sum() == 4 * 4
     assert found.elements.size == thin_ones.sum() + 2 * 3 * 4  # three layers above and below
@@ -329,4 +330,4 @@ def viscous(bulk: BulkViscosity) -> Subcycling:
     """The short steps of a body with bulk viscosity."""
     space = layered(4)
     momentum = Momentum(space, AAA(), bulk_viscosity=bulk)
-    return Subcycling(momentum, np.ones_like(space.X, bool), ExplicitControls(raised_mass=0.0, subcycled=0.1), 1.0)
+    return Subcycling(momentum, small_elements(momentum, 0.1), np.ones_like(space.X, bool), ExplicitControls(), 1.0)

@@ -84,8 +84,9 @@ class Explicit(OneBody):
         self._mass_floor = max(self.controls.mass_floor, 1e-12)  # a node without mass or force stays where it is
         self.interval = SolveInterval(body, self.controls.gamma_every)
         long_step, self.subcycling = self.free, None
-        if self.controls.subcycled and small_elements(self.momentum, self.controls.subcycled).size:
-            self.subcycling = Subcycling(self.momentum, self._free, self.controls, self.interval.longest)
+        share = self.controls.subcycled
+        if share and (small := small_elements(self.momentum, share)).size:
+            self.subcycling = Subcycling(self.momentum, small, self._free, self.controls, self.interval.longest)
             long_step = (self._free & ~self.subcycling.inner[:, None]).ravel()
         self.length = StepLength(self.momentum, long_step, self.controls, self.interval.longest)
         self._since_gamma = 0

@@ -32,7 +32,6 @@ from ..loads.schedule import Loading
 from ..material.regions import among
 from ..system.jit import njit
 from .controls import ExplicitControls
-from .raised_mass import small_elements
 from .step_length import StepLength
 
 __all__ = ["Subcycling", "check_subcycling"]
@@ -50,6 +49,7 @@ class Subcycling:
     Parameters
     ----------
     momentum: the balance of momentum of the body.
+    small: numbers (s,) of the elements that need short steps; layers around them take them too.
     free: mask of its free unknowns (n, dim).
     controls: options.
     longest: step [s] that is not exceeded where nothing swings.
@@ -68,11 +68,12 @@ class Subcycling:
 
     LAYERS = 3
 
-    def __init__(self, momentum: Momentum, free: np.ndarray, controls: ExplicitControls, longest: float) -> None:
+    def __init__(self, momentum: Momentum, small: np.ndarray, free: np.ndarray, controls: ExplicitControls,
+                 longest: float) -> None:
         _check(momentum)
         space = momentum.space
         fast, touched = np.zeros(space.n_elements, bool), np.zeros(space.n_nodes, bool)
-        fast[small_elements(momentum, controls.subcycled)] = True
+        fast[small] = True
         for _ in range(self.LAYERS):
             touched[space.conn[fast]] = True
             fast = touched[space.conn].any(axis=1)
