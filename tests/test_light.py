@@ -12,6 +12,7 @@ from bodies import box, patchy, wavy
 from scipy.sparse import coo_array
 
 import skfsink.fem.kernels.pieces
+import skfsink.fem.pattern
 import skfsink.fem.space
 import skfsink.fields.pieces
 from skfsink.fem import kernels
@@ -48,8 +49,12 @@ def test_geometry_by_pieces(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize("kind", ["quad", "hex"])
 @pytest.mark.parametrize("upper", [False, True])
-def test_slots_of_some_elements(kind: str, upper: bool) -> None:
-    """Fails if the structure is not that of a matrix assembled by scipy, or an entry goes to another place."""
+@pytest.mark.parametrize("kept_too", [False, True])
+def test_slots_of_some_elements(kind: str, upper: bool, kept_too: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fails if the structure is not that of a matrix assembled by scipy, an entry goes to another place, or places are
+    kept of a body that is too large, or found again of a small one."""
+    if not kept_too:
+        monkeypatch.setattr(skfsink.fem.pattern, "KEPT", 1000)
     space, rng = box(kind, 4), np.random.default_rng(3)
     free, absent = rng.uniform(size=space.X.size) < 0.8, np.array([3, 8])
     pattern = Pattern(space, space.dim, free, upper=upper)
@@ -63,6 +68,7 @@ def test_slots_of_some_elements(kind: str, upper: bool) -> None:
     assert np.array_equal(pattern.indices[pattern.diagonal], np.arange(pattern.size))
     some, data = np.array([5, 1, 14]), np.zeros(pattern.nnz)
     found = pattern.slots(some)
+    assert ("slot" in vars(pattern)) == kept_too
     assert np.array_equal(found, pattern.slot[some])
     np.add.at(data, pattern.slot.ravel()[kept], values[kept])
     assert np.allclose(data, expected.data)

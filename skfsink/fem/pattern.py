@@ -13,6 +13,9 @@ from ..system.jit import njit
 __all__ = ["Connectivity", "Pattern"]
 
 
+KEPT = 2**28  # bytes of the places of entries that are kept: of 116,000 hexahedra, or a million quadrilaterals
+
+
 class Connectivity(Protocol):
     """What a pattern is made from: the nodes of the elements (ne, na), and the graph of the nodes, (n, n)."""
 
@@ -59,12 +62,19 @@ class Pattern:
 
         It is kept: 2.3 kB a hexahedron for its displacements; :meth:`slots` gives those of some elements.
         """
-        return self.slots(slice(None))
+        return self._find(slice(None))
 
     def slots(self, elements: np.ndarray | slice) -> np.ndarray:
-        """Those of some elements, (m, nd, nd)."""
-        if "slot" in self.__dict__:
+        """Those of some elements, (m, nd, nd).
+
+        Those of all are kept if they take no more than KEPT, since finding them is a quarter of the time of a tangent.
+        """
+        ne, na = self._conn.shape
+        if "slot" in self.__dict__ or ne * (na * self._block)**2 * np.dtype(np.int32).itemsize <= KEPT:
             return self.slot[elements]
+        return self._find(elements)
+
+    def _find(self, elements: np.ndarray | slice) -> np.ndarray:
         conn = self._conn[elements]
         unknowns = conn.shape[1] * self._block
         found: np.ndarray = np.empty((len(conn), unknowns, unknowns), np.int32)
