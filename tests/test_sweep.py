@@ -123,7 +123,7 @@ def test_a_number_of_one_of_several_tables_varies() -> None:
         assert said in str(error.value), error.value
     one = Deck("custom", {"mesh": "a.vtu", "fibres": layers[:1]})
     assert read_variation("fibres.1.azimuth=1,2", one).values == read_variation("fibres.azimuth=1,2", one).values
-    with pytest.raises(ParameterError, match=r"has 1 table \[\[fibres\]\]: it is fibres.azimuth"):
+    with pytest.raises(ParameterError, match=r"has one table \[\[fibres\]\]: it is fibres.azimuth"):
         read_variation("fibres.2.azimuth=1,2", one)
 
 

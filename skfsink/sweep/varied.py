@@ -109,8 +109,10 @@ def _which(name: str, kind: str, which: str, field: str, count: int) -> int:
     if not which and count == 1:
         return 0
     if not which.isdecimal() or not 1 <= int(which) <= count:
-        of = f"say which, {kind}.1.{field} to {kind}.{count}.{field}" if count > 1 else f"it is {kind}.{field}"
-        raise ParameterError(f"--vary {name}: the deck has {count} table{'s' * (count > 1)} [[{kind}]]: {of}")
+        if count == 1:
+            raise ParameterError(f"--vary {name}: the deck has one table [[{kind}]]: it is {kind}.{field}")
+        raise ParameterError(f"--vary {name}: the deck has {count} tables [[{kind}]]: say which, {kind}.1.{field} to "
+                             f"{kind}.{count}.{field}")
     return int(which) - 1
 
 
