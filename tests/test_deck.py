@@ -132,9 +132,10 @@ def test_a_path_from_the_home_folder(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
 @pytest.mark.parametrize(("text", "said"), [
     ("case = 5", "case must be a name"), ('case = "nothing"', "case must be one of"), ("", "case must be a name"),
+    ('case = "costum"\n[[grips]]\nx = 0', "case must be one of"), ("[[grips]]\nx = 0", "case must be a name"),
     ('case = "simple_shear"\nmesh = "M4"', "unknown key 'mesh'; the keys are case, p"), ("case = ", "is no deck"),
     ('case = "simple_shear"\n[parameters]\nsides = 5', "'sides' is no parameter"),
-    ('case = "simple_shear"\n[parameters]\nout = "/etc"', "'out' is no parameter; `skfsink"),
+    ('case = "simple_shear"\n[parameters]\nout = "/etc"', "'out' is no parameter; `skfsink show simple_shear` lists"),
     ('case = "simple_shear"\n[parameters]\nlengthscale = 1', "'lengthscale' is no parameter; 'length_scale' is one"),
     ('case = "simple_shear"\n[parameters]\nEvent-time = 1', "parameter; 'event_time' is one"),
     ('case = "simple_shear"\n[parameters]\nside = [5]', "side must be a number, or text with a unit such as '1.5 mm'"),

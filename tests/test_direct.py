@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bodies import boundary, box, patchy, wavy
+from bodies import boundary, box, grips, patchy, wavy
 
 from skfsink.errors import ConvergenceError, ParameterError
 from skfsink.fem import direct
@@ -44,6 +44,21 @@ def test_solutions_of_definite_and_indefinite_matrices(space: Space, backend: st
         np.testing.assert_allclose(whole @ solver.solve(b, 1e-10), b, atol=1e-8)
         assert solver.factorize(shifted, indefinite=False) == definite
     assert solver.count == 6
+
+
+@BACKENDS_THERE
+def test_entries_that_were_zero_in_the_first_matrix(kind: str, backend: str):
+    """Fails if a backend takes the entries that the tangent of an undeformed regular body lacks for zero for good."""
+    pytest.importorskip(BACKENDS[backend])
+    space = box(kind, {"quad": 8, "hex": 4}[kind], amount=0.0)
+    momentum, pattern = Momentum(space, AAA()), Pattern(space, space.dim, grips(space, 1.0)[0], upper=True)
+    solver, b, zeros = Factorization(pattern, backend), np.ones(pattern.size), []
+    for u in (np.zeros_like(space.X), wavy(space, 1e-4)):
+        data = momentum.tangent(pattern, u)
+        zeros.append(np.count_nonzero(data == 0.0))
+        assert solver.factorize(data)
+        np.testing.assert_allclose(pattern.symmetric(data) @ solver.apply(b), b, atol=1e-8)
+    assert zeros[0] > zeros[1]
 
 
 @BACKENDS_THERE

@@ -294,7 +294,7 @@ def test_inverted_elements_are_refused(kind: str):
     p = mesh.p.copy()
     inside = np.setdiff1d(np.arange(p.shape[1]), mesh.boundary_nodes())[0]
     p[:, inside] += 0.9
-    with pytest.raises(MeshError, match=r"inverted or degenerate: its Jacobian is -?\d"):
+    with pytest.raises(MeshError, match=r"inverted or degenerate: its Jacobian is -?\d\S* at a Gauss point near \(0"):
         Space(type(mesh)(p, mesh.t))
     t = Space(mesh).mesh.t.copy()  # all of one sense
     order = [1, 0, 3, 2] if kind == "quad" else [1, 0, 4, 5, 2, 3, 7, 6]

@@ -432,7 +432,7 @@ def test_collapsed_elements(name: str, tmp_path: Path) -> None:
             mesh.cells[i] = meshio.CellBlock("quad" if block.dim == 2 else "hexahedron",
                                              cells[:, turn if block.dim == 2 else [*turn, *(turn + 4)]])
     write_mesh(tmp_path / "in.vtu", mesh)
-    with pytest.raises(MeshError, match="it has a node twice; if that is how"):
+    with pytest.raises(MeshError, match=r"it has a node twice, near .*; if that is how"):
         file_sample(tmp_path / "in.vtu")
     sample, wanted = mesh_sample("in", converted(tmp_path / "in.vtu")), mesh_sample("split", split(MESHES[name]()))
     assert sample.space.V.sum() == pytest.approx(wanted.space.V.sum(), rel=1e-13)
@@ -606,3 +606,12 @@ def test_planes_of_names_that_are_taken(tmp_path: Path) -> None:
     for text in ("=x:1", "a", "a=x", "a=x:", "a\tb\n=x:0"):
         with pytest.raises(ParameterError, match="boundary"):
             converted(tmp_path / "in.vtu", boundaries=[text])
+
+
+def test_hinges_are_noted(tmp_path: Path) -> None:
+    """Fails if the command says nothing of what a run warns of: parts that hang together by a single node."""
+    points = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [2, 1], [2, 2], [1, 2]], float)
+    write_mesh(tmp_path / "in.vtu", meshio.Mesh(np.column_stack([points, 0 * points[:, 0]]),
+                                                [("quad", np.array([[0, 1, 2, 3], [2, 4, 5, 6]]))]))
+    said = invoke_program("mesh", tmp_path / "in.vtu", tmp_path / "out.vtu")[2]
+    assert "hang together by a single node, at 1 node(s), such as (1, 1) mm" in said

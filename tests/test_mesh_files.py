@@ -422,7 +422,7 @@ def _newline(mesh: meshio.Mesh) -> None:
 
 @pytest.mark.parametrize("change, part", [
     (_twice, "1 element(s) more than once, such as one near ("),
-    (_corner_twice, "element 4 is inverted or degenerate: it has a node twice"),
+    (_corner_twice, "element 4 is inverted or degenerate: it has a node twice, near ("),
     (_bent, "plane of constant z"), (_upright, "plane of constant z; they lie at one y: turn the mesh"),
     (_small, "mm across"), (_large, "mm across"),
     (_lines_beyond, "nodes that do not exist")])

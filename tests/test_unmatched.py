@@ -69,3 +69,16 @@ def test_slits_pass_and_closed_ones_are_noted(kind: str) -> None:
         lips = 5 * (1 if kind == "quad" else 5)
         assert note.startswith(f"{lips} pair(s) of nodes coincide, between (0, 0.5") == (not width and not coarse)
     assert slit_note(Space(grid(kind, (3, 3, 2)[:2 if kind == "quad" else 3]))) == ""
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_side_of_three_elements_is_refused(dim: int) -> None:
+    """Fails if an element that lies on others, with a corner of its own, is counted as more of the body."""
+    mesh = grid({2: "quad", 3: "hex"}[dim], (4,) * dim)
+    own = mesh.t[:, np.abs(mesh.p[:, mesh.t].mean(axis=1) - 0.6).max(axis=0).argmin()].copy()  # an inner element
+    far = mesh.p[:, own].sum(axis=0).argmax()
+    corner, own[far] = mesh.p[:, own[far]] + 0.07, mesh.p.shape[1]
+    over = type(mesh)(np.column_stack([mesh.p, corner]), np.column_stack([mesh.t, own]))
+    check_sides("plain", Space(mesh))
+    with pytest.raises(MeshError, match=rf"mesh over: {dim} {'edges' if dim == 2 else 'faces'} are shared by more"):
+        check_sides("over", Space(over))

@@ -79,7 +79,7 @@ def _report(source: Path, out: Path, made: meshio.Mesh, sample: Sample, length: 
     from rich.table import Table
 
     from ..errors import SkfsinkError
-    from ..meshing.files.pieces import check_one_piece
+    from ..meshing.files.pieces import check_one_piece, hinge_note
     from ..meshing.files.quality import Quality
     from ..meshing.files.split import counted
     from ..meshing.files.unmatched import check_sides, slit_note
@@ -92,7 +92,7 @@ def _report(source: Path, out: Path, made: meshio.Mesh, sample: Sample, length: 
     for name, text in (("elements", counted(made)), ("nodes", f"{space.n_nodes}"), ("extent", f"{extent} mm"),
                        (size, f"{space.V.sum():.6g} mm^{space.dim}"),
                        ("boundaries", _sets(sample.boundaries, "nodes")), ("regions", _sets(sample.cells, "elements")),
-                       *(("note", note) for note in (*sample.notes, *filter(None, [slit_note(space)])))):
+                       *(("note", note) for note in (*sample.notes, slit_note(space), hinge_note(space)) if note)):
         console.print(f"{name:12}{text}", markup=False)
     quality = Quality.of(space)
     flat = int(np.count_nonzero(quality.jacobian <= 0))

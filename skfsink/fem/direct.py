@@ -113,26 +113,28 @@ class Factorization:
             if not self.definite and indefinite and not self._handle(-2).factorize(data):
                 raise ConvergenceError("the matrix cannot be factorised")
             return self.definite
-        self._lu, whole = None, csc_array(self.pattern.symmetric(data))
+        self._lu = None
         if self.backend == "superlu":
-            self.definite = self._by_superlu(whole)
+            self.definite = self._by_superlu(data)
         else:
-            self.definite = self._by_cholmod(whole)
+            self.definite = self._by_cholmod(self._matrix)
             if not self.definite and indefinite:
-                self._by_superlu(whole)
+                self._by_superlu(data)
         return self.definite
 
-    def _by_superlu(self, whole: csc_array) -> bool:
-        self._lu = lu = sla.splu(whole, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
-                                 options={"SymmetricMode": True})
+    def _by_superlu(self, data: np.ndarray) -> bool:
+        self._lu = lu = sla.splu(csc_array(self.pattern.symmetric(data)), permc_spec="MMD_AT_PLUS_A",
+                                 diag_pivot_thresh=0.0, options={"SymmetricMode": True})
         return bool((lu.perm_r == lu.perm_c).all() and (lu.U.diagonal() > 0).all())
 
-    def _by_cholmod(self, whole: csc_array) -> bool:
+    def _by_cholmod(self, matrix: csr_array) -> bool:
+        """CHOLMOD reads the lower triangle, and analyses it once: entries that are zero now have to be in it."""
         from sksparse import cholmod
+        lower = csc_array(matrix.T)  # the same arrays
         if self._cholesky is None:
-            self._cholesky = cholmod.analyze(whole, mode="supernodal", ordering_method="best")
+            self._cholesky = cholmod.analyze(lower, mode="supernodal", ordering_method="best")
         try:
-            self._cholesky.cholesky_inplace(whole)
+            self._cholesky.cholesky_inplace(lower)
         except cholmod.CholmodNotPositiveDefiniteError:
             return False
         return True

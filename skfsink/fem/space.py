@@ -94,7 +94,8 @@ class Space:
         if not (detJ > 0).all():
             e = int(np.argmin(detJ.min(axis=1)))
             raise MeshError(f"element {e} is inverted or degenerate: its Jacobian is {detJ[e].min():.3g} at a Gauss "
-                            f"point, and must be positive")
+                            f"point near {place_text(X[conn[e]].mean(axis=0))} mm, and must be positive: mend the mesh "
+                            f"there")
         dX = detJ / 2**dim
         w = dX * self._round(X, conn, N) if self.axisymmetric else dX
         for name_, value in (("X", X), ("conn", conn), ("N", N), ("dX", dX), ("w", w)):

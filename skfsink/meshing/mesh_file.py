@@ -114,9 +114,10 @@ def check_mesh(name: str, mesh: meshio.Mesh) -> None:
         raise MeshError(f"mesh {name} must have its quadrilaterals in a plane of constant z; {cure}")
     nodes = np.sort(mesh.cells_dict[kind].astype(np.int64), axis=1)
     if (twice := (nodes[:, 1:] == nodes[:, :-1]).any(axis=1)).any():
-        raise MeshError(f"mesh {name}: element {int(twice.argmax())} is inverted or degenerate: it has a node twice; "
-                        f"if that is how your program writes triangles or wedges, convert it with skfsink mesh {name} "
-                        f"OUT.vtu")
+        at = place(points[nodes[twice.argmax()]].mean(axis=0)[:2 if kind == "quad" else 3])
+        raise MeshError(f"mesh {name}: element {int(twice.argmax())} is inverted or degenerate: it has a node twice, "
+                        f"near {at} mm; if that is how your program writes triangles or wedges, convert it with "
+                        f"skfsink mesh {name} OUT.vtu")
     rows = np.ascontiguousarray(nodes).view(np.dtype((np.void, nodes.itemsize * nodes.shape[1]))).ravel()
     kept = np.unique(rows, return_index=True)[1]
     if len(kept) < len(rows):

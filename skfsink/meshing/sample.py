@@ -18,9 +18,9 @@ from ..errors import MeshError, ParameterError, require
 from ..fem.space import Space
 from ..system.files import path_of
 from ..system.shipped import data_folder
-from .files.pieces import check_one_piece, hinges, merged
+from .files.pieces import check_one_piece, hinge_note, merged
 from .files.split import counted, needs_split
-from .files.tidy import notes_of, place
+from .files.tidy import notes_of
 from .files.unmatched import check_sides, slit_note
 from .kept_mesh import SUFFIX
 from .mesh_file import check_mesh, one_line, quietly, read_mesh_file
@@ -243,12 +243,8 @@ def _from_file(path: Path, merge_nodes: float = 0.0, option: bool = False) -> Sa
     check_sides(sample.name, sample.space)
     if slit := slit_note(sample.space):
         sample = replace(sample, notes=(*sample.notes, slit))
-    if len(nodes := hinges(sample.space)):
-        what = "node" if sample.space.dim == 2 else "node or edge"
-        note = (f"parts of the body hang together by a single {what}, at {len(nodes)} node(s), such as "
-                f"{place(sample.space.X[nodes[0]])} mm: a hinge, or a crack that goes too far; if it is not meant, "
-                f"mend the mesh there")
-        sample = replace(sample, notes=(*sample.notes, note))
+    if hinge := hinge_note(sample.space):
+        sample = replace(sample, notes=(*sample.notes, hinge))
     return sample
 
 

@@ -129,7 +129,7 @@ class Case:
     @cached_property
     def _record(self) -> Record:
         known = {name: parameter.annotation for name, parameter in self.parameters.items() if not parameter.has_tables}
-        return Record(known, partial(_message, tuple(known)))
+        return Record(known, partial(_message, self.name, tuple(known)))
 
     def read(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Values of parameters from a deck: text with a unit becomes a number in the unit of the parameter.
@@ -171,11 +171,11 @@ class Case:
         return {name: {**self.newer, **arguments}[name] for name in self.default_arguments}, values
 
 
-def _message(known: Sequence[str], mistake: Mistake, values: Mapping[str, Any]) -> str:
+def _message(case: str, known: Sequence[str], mistake: Mistake, values: Mapping[str, Any]) -> str:
     if mistake.unknown:
         near = difflib.get_close_matches(mistake.field[:60].lower().replace("-", "_"), known, 1, 0.75)
-        return (f"{mistake.field!r} is no parameter; {f'{near[0]!r} is one, and ' if near else ''}`skfsink show CASE` "
-                f"lists them")
+        return (f"{mistake.field!r} is no parameter; {f'{near[0]!r} is one, and ' if near else ''}`skfsink show "
+                f"{case}` lists them")
     if mistake.field == "mesh" and isinstance(mistake.value, str):
         return mistake.text + r": for \ in a path write /, or put the path in single quotes"
     return mistake.text

@@ -140,14 +140,13 @@ def read_deck(path: str | Path) -> Deck:
 def _deck(data: Mapping[str, Any]) -> Deck:
     """The deck in the content of a file."""
     name, parameters = data.get("case"), data.get("parameters", {})
-    case = find_case(name) if isinstance(name, str) and name in CASES else None
-    top = (*TOP, *(case.tables if case else ()))
-    if unknown := [key for key in data if key not in top]:
-        beneath = "; it belongs under [parameters]" if case and unknown[0] in case.parameters else ""
-        raise ParameterError(f"unknown key {unknown[0]!r}; the keys are {', '.join(top)}{beneath}")
     if not isinstance(name, str) or not isinstance(parameters, dict):
         raise ParameterError(f"case must be a name, one of {', '.join(CASES)}, and parameters a table")
-    case = case or find_case(name)  # which says what there is
+    case = find_case(name)
+    top = (*TOP, *case.tables)
+    if unknown := [key for key in data if key not in top]:
+        beneath = "; it belongs under [parameters]" if unknown[0] in case.parameters else ""
+        raise ParameterError(f"unknown key {unknown[0]!r}; the keys are {', '.join(top)}{beneath}")
     if parts := data.get("made_in_python"):
         raise ParameterError(f"it does not describe its run, parts of which were made in Python "
                              f"({', '.join(map(str, parts))}): run it again from there")

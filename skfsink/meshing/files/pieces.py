@@ -15,7 +15,7 @@ from ...errors import MeshError, require
 from ...fem.space import Space
 from .tidy import add_note, body_blocks, place, renumber
 
-__all__ = ["check_one_piece", "hinges", "merged"]
+__all__ = ["check_one_piece", "hinge_note", "hinges", "merged"]
 
 CLOSE = 1e-3  # distance of nodes that are taken for one, over the shortest edge of an element
 
@@ -75,6 +75,17 @@ def hinges(space: Space) -> np.ndarray:
     np.minimum.at(low, space.conn, part[:, None])
     np.maximum.at(high, space.conn, part[:, None])
     return np.flatnonzero(low < high)
+
+
+def hinge_note(space: Space) -> str:
+    """A note on the :func:`hinges` of a body, "" if there are none."""
+    nodes = hinges(space)
+    if not len(nodes):
+        return ""
+    what = "node" if space.dim == 2 else "node or edge"
+    return (f"parts of the body hang together by a single {what}, at {len(nodes)} node(s), such as "
+            f"{place(space.X[nodes[0]])} mm: a hinge, or a crack that goes too far; if it is not meant, mend the mesh "
+            f"there")
 
 
 def merged(name: str, mesh: meshio.Mesh, tolerance: float) -> meshio.Mesh:

@@ -37,7 +37,13 @@ class _Sides(NamedTuple):
 
 
 def check_sides(name: str, space: Space) -> None:
-    """Refuse a mesh in which a side of an element is covered by smaller ones that share its corners (MeshError)."""
+    """Refuse a mesh in which a side belongs to more than two elements, or is covered by smaller ones that share its
+    corners (MeshError)."""
+    of = np.bincount(space.mesh.t2f.ravel())
+    if (many := np.flatnonzero(of > 2)).size:
+        where = space.X[space.mesh.facets[:, many[0]]].mean(axis=0)
+        raise MeshError(f"mesh {name}: {len(many)} {'edges' if space.dim == 2 else 'faces'} are shared by more than "
+                        f"two elements, such as at {place(where)} mm: elements overlap; mend the mesh there")
     sides = _sides(space)
     side, node = _nodes_on(space, sides)
     order = np.argsort(sides.nodes, axis=None)
