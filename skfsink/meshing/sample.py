@@ -241,11 +241,8 @@ def _from_file(path: Path, merge_nodes: float = 0.0, option: bool = False) -> Sa
     sample = _from_meshio(str(path), data, source=str(path))
     check_one_piece(sample.name, shlex.quote(name), sample.space, option)
     check_sides(sample.name, sample.space)
-    if slit := slit_note(sample.space):
-        sample = replace(sample, notes=(*sample.notes, slit))
-    if hinge := hinge_note(sample.space):
-        sample = replace(sample, notes=(*sample.notes, hinge))
-    return sample
+    notes = filter(None, (slit_note(sample.space), hinge_note(sample.space)))
+    return replace(sample, notes=(*sample.notes, *notes))
 
 
 def _from_meshio(name: str, data: meshio.Mesh, made: bool = False, source: str = "") -> Sample:

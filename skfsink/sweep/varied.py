@@ -67,9 +67,9 @@ def varied(name: str, deck: Deck) -> Varied:
     cracks: Sequence[Any] = deck.parameters.get("cracks", ())
     if dot and (found := [i for i, table in enumerate(cracks) if table["name"] == head]):
         return _of_table(name, "cracks", found[0], tail)
-    kind, _, which = head.partition(".")
+    kind = head.partition(".")[0]
     if kind in case.tables and (tables := deck.parameters.get(kind, ())):
-        return _of_table(name, kind, _which(name, kind, which, tail, len(tables)), tail)
+        return _of_table(name, kind, _which(name, len(tables)), tail)
     others = f"; constants of {law} are {', '.join(constants)}" if constants else ""
     raise ParameterError(f"--vary {plain if not dot else name}: there is no such parameter; `skfsink show CASE` lists "
                          f"them{others}")
@@ -104,16 +104,17 @@ def _quantity(name: str, law: str) -> Callable[[Any], Any]:
     return read
 
 
-def _which(name: str, kind: str, which: str, field: str, count: int) -> int:
-    """Number of a table from zero, from its number from one; none is needed for the only one."""
+def _which(name: str, count: int) -> int:
+    """Number from zero of the table that TABLE.N.FIELD, or TABLE.FIELD of the only one, is of."""
+    kind, *which, field = name.split(".")
     if not which and count == 1:
         return 0
-    if not which.isdecimal() or not 1 <= int(which) <= count:
-        if count == 1:
-            raise ParameterError(f"--vary {name}: the deck has one table [[{kind}]]: it is {kind}.{field}")
-        raise ParameterError(f"--vary {name}: the deck has {count} tables [[{kind}]]: say which, {kind}.1.{field} to "
-                             f"{kind}.{count}.{field}")
-    return int(which) - 1
+    if len(which) == 1 and which[0].isdecimal() and 1 <= int(which[0]) <= count:
+        return int(which[0]) - 1
+    if count == 1:
+        raise ParameterError(f"--vary {name}: the deck has one table [[{kind}]]: it is {kind}.{field}")
+    raise ParameterError(f"--vary {name}: the deck has {count} tables [[{kind}]]: say which, {kind}.1.{field} to "
+                         f"{kind}.{count}.{field}")
 
 
 def _of_table(name: str, kind: str, number: int, field: str) -> Varied:
