@@ -89,10 +89,6 @@ class Exchange(Protocol):
         `pieces` (n,) is the number of the piece of a node, where it `holds` (n,); there, pieces of parts are one.
         """
 
-    def joined(self, places: np.ndarray, pieces: np.ndarray, count: int) -> tuple[np.ndarray, int]:
-        """The same for pieces (m,) of this part at places (m,), by numbers that all parts give them: one at each place.
-        """
-
 
 class _Own:
     """Unknowns of a body in one piece."""
@@ -164,10 +160,6 @@ class Alone:
 
     def same(self, pieces: np.ndarray, count: int, holds: np.ndarray) -> tuple[np.ndarray, int]:
         """The numbers they have."""
-        return np.arange(count), count
-
-    def joined(self, places: np.ndarray, pieces: np.ndarray, count: int) -> tuple[np.ndarray, int]:
-        """The numbers they have: places between parts there are none."""
         return np.arange(count), count
 
 

@@ -6,7 +6,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from skfem.refdom import Refdom, RefHex, RefQuad
 
+from .quadrature import AXES
 from .space import Space
 
 __all__ = ["FACETS", "Facets", "boundary_facets", "facets_of"]
@@ -15,6 +17,17 @@ __all__ = ["FACETS", "Facets", "boundary_facets", "facets_of"]
 #: nodes are at (0, 0), (1, 0), (0, 1) and (1, 1) of (s, t), and the normal is x,s × x,t.
 FACETS = {2: np.array([[2, 0], [1, 3], [0, 1], [3, 2]]),
           3: np.array([[0, 4, 2, 6], [1, 3, 5, 7], [0, 1, 4, 5], [2, 6, 3, 7], [0, 2, 1, 3], [4, 5, 6, 7]])}
+
+
+def _in_order_of(refdom: type[Refdom]) -> np.ndarray:
+    """Those facets in the order in which scikit-fem numbers the sides of an element."""
+    dim = len(refdom.p)
+    local = refdom.p[AXES[dim]].T.astype(int) @ 2 ** np.arange(dim)  # its corners by our numbers
+    return np.array([next(facet for facet in FACETS[dim] if set(facet) == set(local[corners]))
+                     for corners in refdom.facets])
+
+
+_FACETS_OF_SIDES = {2: _in_order_of(RefQuad), 3: _in_order_of(RefHex)}
 
 
 class Facets(NamedTuple):
@@ -33,7 +46,8 @@ class Facets(NamedTuple):
 
     def some(self, mask: np.ndarray) -> Facets:
         """Those where a `mask` (f,) is true."""
-        return Facets(self.elements[mask], self.local[mask], self.nodes[mask])
+        kept = np.flatnonzero(mask)
+        return Facets(self.elements[kept], self.local[kept], self.nodes[kept])
 
     @classmethod
     def joined(cls, parts: Sequence[Facets]) -> Facets:
@@ -43,12 +57,9 @@ class Facets(NamedTuple):
 
 def facets_of(space: Space, numbers: np.ndarray, side: np.ndarray | int = 0) -> Facets:
     """Facets by the `numbers` (f,) they have in the mesh, each of its first or second element, `side` 0 or 1 (f,)."""
-    elements = space.mesh.f2t[np.broadcast_to(side, numbers.shape), numbers]
-    table = FACETS[space.dim]
-    of_element = space.conn[elements][:, table]
-    there = np.sort(space.mesh.facets[:, numbers].T, axis=1)
-    which = (np.sort(of_element, axis=2) == there[:, None]).all(axis=2).argmax(axis=1)
-    return Facets(elements, table[which], of_element[np.arange(numbers.size), which])
+    elements = space.mesh.f2t[side, numbers]
+    local = _FACETS_OF_SIDES[space.dim][(space.mesh.t2f[:, elements] == numbers).argmax(axis=0)]
+    return Facets(elements, local, space.conn[elements[:, None], local])
 
 
 def boundary_facets(space: Space, nodes: np.ndarray) -> np.ndarray:

@@ -158,6 +158,6 @@ def _flux(corners: np.ndarray, revolved: bool = False) -> float:
     """
     of = corners if corners.shape[1] == 2 else corners[:, _QUAD]
     x, out = of.reshape(-1, of.shape[2]), np.empty(len(of))
-    swept_volumes(np.arange(len(x)).reshape(of.shape[:2]), np.zeros_like(x), x, np.ones((2, len(of))), out,
-                  revolved)
+    start, owner = np.zeros_like(x), np.zeros(len(of), np.int64)
+    swept_volumes(np.arange(len(x)).reshape(of.shape[:2]), owner, np.ones((2, 1)), start, start, x, out, revolved)
     return -float(out.sum())

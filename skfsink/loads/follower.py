@@ -112,7 +112,8 @@ class FollowerLoads:
             self._kept_volume[self._wet.bears] = 0.0
             if self._last is not None:
                 dies = before & ~self._wet.bears
-                self._kept_volume[dies] = self._swept(self._last, self._wet.boundary.some(dies))
+                self._kept_volume[dies] = self._swept(self._last, self._wet.boundary.some(dies),
+                                                      self._wet.boundary_owner[dies])
 
     # --- forces, stiffness, work ---
     def pressures(self, u: np.ndarray, values: np.ndarray | None = None) -> np.ndarray:
@@ -141,10 +142,11 @@ class FollowerLoads:
         """
         if self._fillings:
             self._last = u.copy()
-        part = np.zeros_like(self._wet.X)
-        add_pressure(self._wet.corner, self.pressures(u)[self._wet.owner], self._wet.X + u[self._wet.nodes], part,
-                     self.space.axisymmetric)
-        out[self._wet.nodes] += part
+        self._add_pressure(self.pressures(u), u, out)
+
+    def _add_pressure(self, p: np.ndarray, u: np.ndarray, out: np.ndarray) -> None:
+        """Add p int N_a n da at the displacement `u` to `out`, both (n, dim); `p` (loads,) may be any."""
+        add_pressure(self._wet.facets.nodes, self._wet.owner, p, self.space.X, u, out, self.space.axisymmetric)
 
     def idle(self, free: np.ndarray) -> list[int]:
         """Numbers of the loads that strain nothing: where they push, all nodes are held, and no crack is to be theirs.
@@ -153,9 +155,9 @@ class FollowerLoads:
         """
         found, alone = [], np.eye(len(self.loads))
         for number, load in enumerate(self.loads):
-            force = np.zeros_like(self._wet.X)
-            add_pressure(self._wet.corner, alone[number][self._wet.owner], self._wet.X, force, self.space.axisymmetric)
-            moves = float(np.abs(force[free[self._wet.nodes]]).max(initial=0.0))
+            force, nowhere = np.zeros((2, *self.space.X.shape))
+            self._add_pressure(alone[number], nowhere, force)
+            moves = float(np.abs(force[free]).max(initial=0.0))
             if moves <= 1e-9 * float(np.abs(force).max()) and not (isinstance(load, Pressure) and load.in_crack):
                 found.append(number)
         return found
@@ -183,8 +185,8 @@ class FollowerLoads:
     def _swept_work(self, first: np.ndarray, last: np.ndarray, u: np.ndarray, end: np.ndarray) -> float:
         """Work of pressures that go evenly from the `first` to the `last` (loads,)."""
         out = np.empty(self._wet.owner.size)
-        swept_volumes(self._wet.corner, self._wet.X + u[self._wet.nodes], end[self._wet.nodes] - u[self._wet.nodes],
-                      np.stack([first[self._wet.owner], last[self._wet.owner]]), out, self.space.axisymmetric)
+        swept_volumes(self._wet.facets.nodes, self._wet.owner, np.stack([first, last]), self.space.X, u, end, out,
+                      self.space.axisymmetric)
         return self.space.exchange.total(float(out.sum()))
 
     def add_stiffness(self, pattern: Pattern, u: np.ndarray, data: np.ndarray) -> None:
@@ -245,8 +247,7 @@ class FollowerLoads:
         """Derivatives of the forces of the facets at `u` under pressures `p` (loads,), (f, k*dim, k*dim)."""
         unknowns = self._wet.facets.nodes.shape[-1] * self.space.dim
         K = np.empty((self._wet.owner.size, unknowns, unknowns))
-        pressure_tangents(self._wet.corner, p[self._wet.owner], self._wet.X + u[self._wet.nodes], K,
-                          self.space.axisymmetric)
+        pressure_tangents(self._wet.facets.nodes, p[self._wet.owner], self.space.X + u, K, self.space.axisymmetric)
         return K
 
     def stiffening(self, u: np.ndarray) -> np.ndarray | None:
@@ -255,10 +256,9 @@ class FollowerLoads:
             return None
         columns = np.zeros((len(self._fillings), *self.space.X.shape))
         for column, (k, load) in zip(columns, self._fillings):
-            part = np.zeros_like(self._wet.X)
-            add_pressure(self._wet.corner, np.where(self._wet.owner == k, load.compliance**-0.5, 0.0),
-                         self._wet.X + u[self._wet.nodes], part, self.space.axisymmetric)
-            column[self._wet.nodes] = part
+            p = np.zeros(len(self.loads))
+            p[k] = load.compliance**-0.5
+            self._add_pressure(p, u, column)
             self.space.exchange.whole(column)
         return columns.reshape(len(columns), -1).T
 
@@ -279,13 +279,14 @@ class FollowerLoads:
         it is counted from the undeformed crack on; the volume below elements that have failed stays as it was.
         """
         count = len(self.loads)
-        volumes = np.bincount(self._wet.owner, self._swept(u, self._wet.facets), minlength=count)
+        volumes = np.bincount(self._wet.owner, self._swept(u, self._wet.facets, self._wet.owner), minlength=count)
         volumes = volumes + np.bincount(self._wet.boundary_owner, self._kept_volume, minlength=count)
         return self.space.exchange.sums(volumes)
 
-    def _swept(self, u: np.ndarray, facets: Facets) -> np.ndarray:
-        out = np.empty(facets.elements.size)
-        swept_volumes(facets.nodes, self.space.X, u, np.ones((2, out.size)), out, self.space.axisymmetric)
+    def _swept(self, u: np.ndarray, facets: Facets, owner: np.ndarray) -> np.ndarray:
+        out, X = np.empty(owner.size), self.space.X
+        swept_volumes(facets.nodes, owner, np.ones((2, len(self.loads))), X, np.zeros_like(X), u, out,
+                      self.space.axisymmetric)
         return out
 
     def area(self, u: np.ndarray) -> np.ndarray:

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from copy import copy
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from ..errors import MeshError, ParameterError
 from ..fem.facets import Facets, boundary_facets, facets_of
+from ..fem.kernels.flood import flood
+from ..fem.kernels.relax import without_force
 from ..fem.selection import Selection
 from ..fem.space import Space
 
@@ -21,7 +21,7 @@ class WettedSurface:
     """Facets that several loads act on.
 
     Memory: the facets, and `area` of them, are of the density last given to `keep`; in a part of a body on its space
-    last given to `on`. `of_part` is of the undamaged facets.
+    last given to `on`, as are `nodes`. `of_part` is of the undamaged facets.
 
     Parameters
     ----------
@@ -34,7 +34,6 @@ class WettedSurface:
     boundary, boundary_owner: facets of the undamaged boundaries, and the load of each, (b,).
     bears: those of them that bear load now, (b,).
     facets, owner: all that bear load now, and the load of each, (f,).
-    nodes, corner, X: nodes of these facets, (k,), the facets by their places among these, and their positions.
 
     Raises
     ------
@@ -64,10 +63,10 @@ class WettedSurface:
                                  f"of the other")
         self.boundary = facets_of(space, everywhere)
         self.bears = np.ones(everywhere.size, bool)
-        self._gone = np.zeros(0, np.int64)  # elements without force, at the last `keep`
+        self._gone = np.zeros(space.n_elements, bool)  # elements without force, at the last `keep`
         none = np.zeros(0, np.int64)
         self._between, self._between_numbers = facets_of(space, none), none  # sides that part this one from others
-        self._take(self.boundary, self.boundary_owner)
+        self.facets, self.owner = self.boundary, self.boundary_owner
 
     # --- parts of a body ---
     def of_part(self, part: Selection) -> WettedSurface:
@@ -75,20 +74,20 @@ class WettedSurface:
         own = copy(self)
         mine = part.element[self.boundary.elements] >= 0
         own.boundary, own.boundary_owner = _in_part(self.boundary.some(mine), part), self.boundary_owner[mine]
-        own.bears, own._gone = np.ones(own.boundary_owner.size, bool), np.zeros(0, np.int64)
+        own.bears = np.ones(own.boundary_owner.size, bool)
         if self._cracks:
             sides = self.space.mesh.f2t
             here = (part.element[sides] >= 0) & (sides >= 0)
             own._between_numbers = np.flatnonzero((sides[1] >= 0) & (here.sum(axis=0) == 1))
             side = here[1, own._between_numbers].astype(int)
             own._between = _in_part(facets_of(self.space, own._between_numbers, side), part)
-        del own.space, own.facets, own.owner, own.nodes, own.corner, own.X
+        del own.space, own.facets, own.owner, own._gone
         return own
 
     def on(self, space: Space) -> None:
         """Lie on the `space` of the part."""
-        self.space = space
-        self._take(self.boundary, self.boundary_owner)
+        self.space, self._gone = space, np.zeros(space.n_elements, bool)
+        self.facets, self.owner = self.boundary, self.boundary_owner
 
     # --- the surface at a density ---
 
@@ -98,57 +97,39 @@ class WettedSurface:
         Elements do not that are `deleted` (ne,), or have the nodal density `gamma` (n,) below `floor` at all their
         Gauss points.
         """
-        conn, N = self.space.conn, self.space.N
-        near = np.union1d(self._at(np.flatnonzero(gamma < floor)), np.flatnonzero(deleted))
-        gone = near[deleted[near] | (gamma[conn[near]] @ N.T < floor).all(axis=1)]
+        gone = np.empty(self.space.n_elements, bool)
+        without_force(self.space.conn, gamma, self.space.N, deleted, floor, gone)
         if self.space.exchange.greatest(float(not np.array_equal(gone, self._gone))) == 0.0:
             return False
         self._gone = gone
-        mask = np.zeros(self.space.n_elements, bool)
-        mask[gone] = True
-        self.bears = ~mask[self.boundary.elements]
-        parts, owners = [self.boundary.some(self.bears)], [self.boundary_owner[self.bears]]
+        bears = ~gone[self.boundary.elements]
+        if not self._cracks and np.array_equal(bears, self.bears):
+            return False
+        self.bears = bears
+        parts, owners = [self.boundary.some(bears)], [self.boundary_owner[bears]]
         for k in self._cracks:
-            parts.append(self._lips(mask, self.boundary.elements[self.boundary_owner == k]))
+            parts.append(self._lips(gone, self.boundary.elements[self.boundary_owner == k]))
             owners.append(np.full(parts[-1].elements.size, k))
-        self._take(Facets.joined(parts), np.concatenate(owners))
+        self.facets, self.owner = Facets.joined(parts), np.concatenate(owners)
         return True
 
-    def _at(self, nodes: np.ndarray) -> np.ndarray:
-        """Elements at some nodes, (k,)."""
-        start, entry = self.space.incidence
-        first, count = start[nodes], start[nodes + 1] - start[nodes]
-        places = np.repeat(first - np.cumsum(count) + count, count) + np.arange(count.sum())
-        elements: np.ndarray = entry[places] // self.space.conn.shape[1]
-        return elements
-
-    def _take(self, facets: Facets, owner: np.ndarray) -> None:
-        self.facets, self.owner = facets, owner
-        self.nodes, corner = np.unique(facets.nodes, return_inverse=True)
-        self.corner = corner.reshape(facets.nodes.shape)
-        self.X = self.space.X[self.nodes]
+    @property
+    def nodes(self) -> np.ndarray:
+        """Nodes of the facets that bear load now, (k,)."""
+        return np.unique(self.facets.nodes)
 
     def _lips(self, gone: np.ndarray, at: np.ndarray) -> Facets:
         """Sides of elements that bear force, towards elements that are `gone` and joined by sides to some `at` (k,)."""
-        mesh = self.space.mesh
-        inner = np.flatnonzero(mesh.f2t[1] >= 0)
-        one, other = mesh.f2t[:, inner]
-        both = gone[one] & gone[other]
-        number = np.cumsum(gone) - 1  # of those that are gone
-        size = int(gone.sum())
-        graph = coo_array((np.ones(int(both.sum()), bool), (number[one[both]], number[other[both]])), shape=(size,) * 2)
-        count, label = connected_components(graph, directed=False)
-        exchange, between = self.space.exchange, self._between.elements
-        open_here = gone[between]
-        piece, pieces = exchange.joined(self._between_numbers[open_here], label[number[between[open_here]]], count)
-        label = piece[label]
-        begins = exchange.sums(np.bincount(label[number[at[gone[at]]]], minlength=pieces)) > 0.0
-        reached = np.zeros(gone.size, bool)
-        reached[gone] = begins[label]
-        beyond = np.isin(self._between_numbers, exchange.all(self._between_numbers[reached[between]]))
-        return Facets.joined([*(facets_of(self.space, inner[reached[out] & ~gone[here]], side)
-                                for side, (here, out) in enumerate(((one, other), (other, one)))),
-                              self._between.some(beyond & ~open_here)])
+        mesh, exchange, between = self.space.mesh, self.space.exchange, self._between.elements
+        reached, ends = np.zeros(gone.size, bool), np.zeros(mesh.nfacets, np.int8)
+        beyond = np.zeros(between.size, bool)
+        start = at[gone[at]]
+        while exchange.greatest(float(start.size)) > 0.0:  # once more in a part that others reach
+            flood(mesh.t2f, mesh.f2t, gone, start, reached, ends)
+            beyond = np.isin(self._between_numbers, exchange.all(self._between_numbers[reached[between]]))
+            start = between[beyond & gone[between] & ~reached[between]]
+        return Facets.joined([*(facets_of(self.space, np.flatnonzero(ends == side + 1), side) for side in (0, 1)),
+                              self._between.some(beyond & ~gone[between])])
 
     def area(self, u: np.ndarray) -> np.ndarray:
         """Areas of the facets, deformed by `u` (n, dim), (f,) [mm^2; mm in 2D]."""

@@ -37,9 +37,11 @@ from skfsink.fem.space import Space
 from skfsink.fields.density import Density, DensitySolver
 from skfsink.fields.momentum import Momentum
 from skfsink.fields.state import State
+from skfsink.loads.follower import FollowerLoads
 from skfsink.material import AAA, SinkLaw
 from skfsink.meshing.sample import Sample, load_sample
 from skfsink.methods.explicit import Explicit
+from skfsink.scene.deck import read_deck
 from skfsink.study.machine import machine
 
 HERE = Path(__file__).resolve().parent
@@ -218,6 +220,45 @@ def dog_bone() -> dict[str, Any]:
     return {**_run("dog_bone", "--mesh", "paper", threads=1), "target": "cost.wall_s.event <= 480"}
 
 
+def pressure() -> dict[str, Any]:
+    """Shares of the event of the aneurysm that its pressure takes, which acts in the tear as well, on one core."""
+    return {mesh: _pressure(mesh) for mesh in ("coarse", "fine")} | {"target": "share <= 0.05"}
+
+
+def _pressure(mesh: str) -> dict[str, Any]:
+    spent = dict.fromkeys(("add_force", "work", "keep", "at", "stiffest"), 0.0)
+
+    def watched(name: str, method: Callable[..., Any]) -> Callable[..., Any]:
+        def call(*arguments: Any) -> Any:
+            start = time.perf_counter()
+            result = method(*arguments)
+            spent[name] += time.perf_counter() - start
+            return result
+
+        return call
+
+    def begin(integrator: Explicit, *arguments: Any) -> Any:
+        spent.update(dict.fromkeys(spent, 0.0))
+        return start_of_event(integrator, *arguments)
+
+    start_of_event, methods = Explicit.begin, {name: getattr(FollowerLoads, name) for name in spent}
+    deck = HERE.parents[1] / "cases" / "aneurysm" / {"coarse": "scene.toml", "fine": "fine.toml"}[mesh]
+    try:
+        Explicit.begin = begin  # type: ignore[assignment, method-assign]
+        for name, method in methods.items():
+            setattr(FollowerLoads, name, watched(name, method))
+        for _ in range(2 if mesh == "coarse" else 1):  # the first compiles
+            with tempfile.TemporaryDirectory() as folder:
+                read_deck(deck).run(out=Path(folder) / "run", quiet=True, threads=1)
+                summary = json.loads((Path(folder) / "run" / "summary.json").read_text())
+    finally:
+        Explicit.begin = start_of_event  # type: ignore[method-assign]
+        for name, method in methods.items():
+            setattr(FollowerLoads, name, method)
+    event = summary["cost"]["wall_s"]["event"]
+    return {"elements": summary["elements"], "event_s": event, "spent_s": spent, "share": sum(spent.values()) / event}
+
+
 def start_up() -> dict[str, Any]:
     """From the shell to the first step of the coarse plate: compiled code in the cache, and none of it."""
     probe = ("from pathlib import Path; from skfsink import simulate as s; step = s.Simulation._pause\n"
@@ -240,7 +281,7 @@ def start_up() -> dict[str, Any]:
 
 
 ALL = {f.__name__: f for f in (tangent, machine_limits, step, gamma, start_up, run_M3, event_M4, event_M4_one_thread,
-                               memory_M5, quasistatic_M4, hht_M3, dog_bone)}
+                               memory_M5, quasistatic_M4, hht_M3, dog_bone, pressure)}
 
 
 def main(names: list[str]) -> None:

@@ -1,4 +1,7 @@
-"""The pass that gives the element loops a new relative density, and books the stored energy its fall takes."""
+"""The pass that gives the element loops a new relative density, and books the stored energy its fall takes.
+
+And the elements that bear no force at a density.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +9,7 @@ import numpy as np
 
 from ...system.jit import njit
 
-__all__ = ["relax"]
+__all__ = ["relax", "without_force"]
 
 
 @njit(cache=True, nogil=True)
@@ -34,3 +37,21 @@ def relax(nodal, N, deleted, floor, elements):  # type: ignore[no-untyped-def]
                 total += geometry[b, first + q, i] * W[b, q, i] * (gamma[b, q, i] - new)
                 gamma[b, q, i] = new
     return total
+
+
+@njit(cache=True)
+def without_force(conn, nodal, N, deleted, floor, out):  # type: ignore[no-untyped-def]
+    """Whether elements are `deleted`, or the nodal field is below `floor` at all their Gauss points, to `out` (ne,)."""
+    na = conn.shape[1]
+    for e in range(conn.shape[0]):
+        below = 0
+        for a in range(na):
+            below += nodal[conn[e, a]] < floor
+        out[e] = deleted[e] or below == na
+        if 0 < below < na and not out[e]:
+            out[e] = True
+            for q in range(na):
+                value = 0.0
+                for a in range(na):
+                    value += N[q, a] * nodal[conn[e, a]]
+                out[e] = out[e] and value < floor

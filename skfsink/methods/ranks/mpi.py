@@ -151,9 +151,9 @@ class MPIExchange:
     def same(self, pieces: np.ndarray, count: int, holds: np.ndarray) -> tuple[np.ndarray, int]:
         """One number in the whole body for each of the `count` pieces of this part, and how many there are in it."""
         nodes = self._between[holds[self._between]]
-        return self.joined(self.part.nodes[nodes], pieces[nodes], count)
+        return self._joined(self.part.nodes[nodes], pieces[nodes], count)
 
-    def joined(self, places: np.ndarray, pieces: np.ndarray, count: int) -> tuple[np.ndarray, int]:
+    def _joined(self, places: np.ndarray, pieces: np.ndarray, count: int) -> tuple[np.ndarray, int]:
         """The same for pieces (m,) of this part at places (m,), by numbers that all parts give them: one at each place.
         """
         counts = np.array(self.comm.allgather(count))
