@@ -42,7 +42,7 @@ def test_elements_without_force(space: Space):
     gamma = rng.choice([0.2, 0.45, 0.55, 1.0], space.n_nodes, p=[0.6, 0.2, 0.1, 0.1])
     deleted = rng.random(space.n_elements) < 0.1
     found = np.empty(space.n_elements, bool)
-    without_force(space.conn, gamma, space.N, deleted, 0.5, found)
+    without_force(space.nodes, gamma, space.N, deleted, 0.5, found)
     assert np.array_equal(found, deleted | (space.at_gauss(gamma) < 0.5).all(axis=1))
     mixed = (gamma[space.conn] < 0.5).any(axis=1) & (gamma[space.conn] >= 0.5).any(axis=1) & ~deleted
     assert found[mixed].any() and not found[mixed].all()

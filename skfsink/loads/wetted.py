@@ -66,7 +66,7 @@ class WettedSurface:
         self._gone = np.zeros(space.n_elements, bool)  # elements without force, at the last `keep`
         none = np.zeros(0, np.int64)
         self._between, self._between_numbers = facets_of(space, none), none  # sides that part this one from others
-        self.facets, self.owner = self.boundary, self.boundary_owner
+        self.facets, self.owner = self._whole = self.boundary, self.boundary_owner
 
     # --- parts of a body ---
     def of_part(self, part: Selection) -> WettedSurface:
@@ -81,13 +81,13 @@ class WettedSurface:
             own._between_numbers = np.flatnonzero((sides[1] >= 0) & (here.sum(axis=0) == 1))
             side = here[1, own._between_numbers].astype(int)
             own._between = _in_part(facets_of(self.space, own._between_numbers, side), part)
-        del own.space, own.facets, own.owner, own._gone
+        del own.space, own.facets, own.owner, own._whole, own._gone
         return own
 
     def on(self, space: Space) -> None:
         """Lie on the `space` of the part."""
         self.space, self._gone = space, np.zeros(space.n_elements, bool)
-        self.facets, self.owner = self.boundary, self.boundary_owner
+        self.facets, self.owner = self._whole = self.boundary, self.boundary_owner
 
     # --- the surface at a density ---
 
@@ -98,18 +98,20 @@ class WettedSurface:
         Gauss points.
         """
         gone = np.empty(self.space.n_elements, bool)
-        without_force(self.space.conn, gamma, self.space.N, deleted, floor, gone)
+        without_force(self.space.nodes, gamma, self.space.N, deleted, floor, gone)
         if self.space.exchange.greatest(float(not np.array_equal(gone, self._gone))) == 0.0:
             return False
         self._gone = gone
         bears = ~gone[self.boundary.elements]
-        if not self._cracks and np.array_equal(bears, self.bears):
+        if not np.array_equal(bears, self.bears):
+            self.bears, self._whole = bears, (self.boundary.some(bears), self.boundary_owner[bears])
+        elif not self._cracks:
             return False
-        self.bears = bears
-        parts, owners = [self.boundary.some(bears)], [self.boundary_owner[bears]]
+        parts, owners = [self._whole[0]], [self._whole[1]]
         for k in self._cracks:
-            parts.append(self._lips(gone, self.boundary.elements[self.boundary_owner == k]))
-            owners.append(np.full(parts[-1].elements.size, k))
+            for lips in self._lips(gone, self.boundary.elements[self.boundary_owner == k]):
+                parts.append(lips)
+                owners.append(np.full(lips.elements.size, k))
         self.facets, self.owner = Facets.joined(parts), np.concatenate(owners)
         return True
 
@@ -118,8 +120,11 @@ class WettedSurface:
         """Nodes of the facets that bear load now, (k,)."""
         return np.unique(self.facets.nodes)
 
-    def _lips(self, gone: np.ndarray, at: np.ndarray) -> Facets:
-        """Sides of elements that bear force, towards elements that are `gone` and joined by sides to some `at` (k,)."""
+    def _lips(self, gone: np.ndarray, at: np.ndarray) -> list[Facets]:
+        """Sides of elements that bear force, towards elements that are `gone` and joined by sides to some `at` (k,).
+
+        Those towards elements of this part, and those towards others.
+        """
         mesh, exchange, between = self.space.mesh, self.space.exchange, self._between.elements
         reached, ends = np.zeros(gone.size, bool), np.zeros(mesh.nfacets, np.int8)
         beyond = np.zeros(between.size, bool)
@@ -128,8 +133,9 @@ class WettedSurface:
             flood(mesh.t2f, mesh.f2t, gone, start, reached, ends)
             beyond = np.isin(self._between_numbers, exchange.all(self._between_numbers[reached[between]]))
             start = between[beyond & gone[between] & ~reached[between]]
-        return Facets.joined([*(facets_of(self.space, np.flatnonzero(ends == side + 1), side) for side in (0, 1)),
-                              self._between.some(beyond & ~gone[between])])
+        lips = [np.flatnonzero(ends == side) for side in (1, 2)]
+        side = np.repeat([0, 1], [some.size for some in lips])
+        return [facets_of(self.space, np.concatenate(lips), side), self._between.some(beyond & ~gone[between])]
 
     def area(self, u: np.ndarray) -> np.ndarray:
         """Areas of the facets, deformed by `u` (n, dim), (f,) [mm^2; mm in 2D]."""

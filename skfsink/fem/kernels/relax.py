@@ -44,14 +44,17 @@ def without_force(conn, nodal, N, deleted, floor, out):  # type: ignore[no-untyp
     """Whether elements are `deleted`, or the nodal field is below `floor` at all their Gauss points, to `out` (ne,)."""
     na = conn.shape[1]
     for e in range(conn.shape[0]):
-        below = 0
+        count = 0
         for a in range(na):
-            below += nodal[conn[e, a]] < floor
-        out[e] = deleted[e] or below == na
-        if 0 < below < na and not out[e]:
-            out[e] = True
+            count += nodal[conn[e, a]] < floor
+        out[e] = deleted[e] or count == na
+        if 0 < count < na and not out[e]:
+            fails = True
             for q in range(na):
                 value = 0.0
                 for a in range(na):
                     value += N[q, a] * nodal[conn[e, a]]
-                out[e] = out[e] and value < floor
+                if value >= floor:
+                    fails = False
+                    break
+            out[e] = fails

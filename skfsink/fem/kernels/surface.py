@@ -181,7 +181,7 @@ def _corner_normals(c, n):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _integrate(n, out):  # type: ignore[no-untyped-def]
-    """out (4, 3) = int N_a n ds dt over a face, of a field that is bilinear between its values `n` (4, 3) at corners."""
+    """out (4, 3) = int N_a n ds dt over a face; `n` is bilinear, with the values `n` (4, 3) at the corners."""
     for i in range(3):
         y0, y1 = 2.0 * n[0, i] + n[1, i], n[0, i] + 2.0 * n[1, i]
         y2, y3 = 2.0 * n[2, i] + n[3, i], n[2, i] + 2.0 * n[3, i]
