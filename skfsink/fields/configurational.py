@@ -70,9 +70,9 @@ def configurational_forces(momentum: Momentum, u: np.ndarray) -> np.ndarray:
     (:mod:`.release_rate`). Dead loads and contact have no part in it.
     """
     space = momentum.space
-    elements = np.arange(space.n_elements)
-    stress = point_stress(momentum, u, elements, momentum.gamma)
-    local = np.einsum("eq,eqKJ,eqaJ->eaK", space.w, stress.tensor, space.dN)
+    elements, dN = np.arange(space.n_elements), space.dN
+    stress = point_stress(momentum, u, elements, momentum.gamma, dN)
+    local = np.einsum("eq,eqKJ,eqaJ->eaK", space.w, stress.tensor, dN)
     if space.axisymmetric:
         local[..., 0] += np.einsum("eq,eq,eqa->ea", space.w, stress.around, space.around)
     out = np.zeros_like(space.X)
@@ -81,23 +81,29 @@ def configurational_forces(momentum: Momentum, u: np.ndarray) -> np.ndarray:
     return out
 
 
-def point_stress(momentum: Momentum, u: np.ndarray, elements: np.ndarray, gamma: np.ndarray) -> PointStress:
-    """Energy and stress of `elements` (m,) at the displacement `u` (n, dim), for the density `gamma` (m, nq)."""
+def point_stress(momentum: Momentum, u: np.ndarray, elements: np.ndarray, gamma: np.ndarray,
+                 dN: np.ndarray) -> PointStress:
+    """Energy and stress of `elements` (m,) at the displacement `u` (n, dim), for the density `gamma` (m, nq).
+
+    `dN` are their :meth:`.Space.slopes`.
+    """
     space, dim = momentum.space, momentum.space.dim
-    H = np.swapaxes(u[space.conn[elements]], 1, 2)[:, None] @ space.slopes(elements)
-    found = PointStress(np.zeros_like(gamma), np.zeros_like(gamma), np.zeros_like(H), H, np.zeros_like(gamma),
-                        np.zeros_like(gamma))
+    H = np.swapaxes(u[space.conn[elements]], 1, 2)[:, None] @ dN
+    F = np.zeros((*gamma.shape, 3, 3))
+    F[..., :dim, :dim] = H
+    F[..., range(3), range(3)] += 1.0
+    space.add_hoop(F, u, elements)
+    W, excess, P = np.empty_like(gamma), np.empty_like(gamma), np.empty_like(F)
     for part, rows, own in among(momentum.parts, elements):
-        F = np.zeros((len(rows), gamma.shape[1], 3, 3))
-        F[...] = np.eye(3)
-        F[..., :dim, :dim] += H[rows]
-        space.add_hoop(F, u, elements[rows])
-        W, P, excess = _of_part(momentum, part, own, F, gamma[rows])
-        found.energy[rows], found.excess[rows], found.P[rows] = gamma[rows] * W, excess, P[..., :dim, :dim]
-        if space.axisymmetric:
-            found.strain[rows] = F[..., 2, 2] - 1.0
-            found.around[rows] = gamma[rows] * W + excess - (F[..., 2, 2] - 1.0) * P[..., 2, 2]
-    return found
+        if part.elements is None:
+            W, P, excess = _of_part(momentum, part, own, F, gamma)
+        else:
+            W[rows], P[rows], excess[rows] = _of_part(momentum, part, own, F[rows], gamma[rows])
+    energy, around, strain = gamma * W, np.zeros_like(gamma), np.zeros_like(gamma)
+    if space.axisymmetric:
+        strain = F[..., 2, 2] - 1.0
+        around = energy + excess - strain * P[..., 2, 2]
+    return PointStress(energy, excess, P[..., :dim, :dim], H, around, strain)
 
 
 def _of_part(momentum: Momentum, part: Part, own: np.ndarray, F: np.ndarray,
@@ -116,15 +122,15 @@ def _of_part(momentum: Momentum, part: Part, own: np.ndarray, F: np.ndarray,
     if isinstance(material, GeneralMaterial):
         fibres = None if part.fibres is None else part.fibres[own][:, None]
         psi = material.isochoric_energy(F, J_FLOOR, fibres)
-        P = material.isochoric_stress(F, J_FLOOR, fibres)
+        P, pressure = gamma[..., None, None] * material.isochoric_stress(F, J_FLOOR, fibres), p
     else:
         floored, s, J_e = crushed(np.where(gamma > 0, J, 1.0))
         R, tr_C = floored ** (-2 / 3) * s, np.einsum("...iJ,...iJ", F, F)
         psi, slope, _ = material.isochoric(R * tr_C)
-        P = (slope * R)[..., None, None] * (2 * F - (2 / 3 * tr_C / J_e)[..., None, None] * cof)
-    W = psi + 0.5 * k * (J_bar - 1) ** 2
-    P = gamma[..., None, None] * P + p[..., None, None] * cof
-    return W, P, p * (J - J_bar)
+        slope = 2 * gamma * slope * R
+        P, pressure = slope[..., None, None] * F, p - slope * tr_C / (3 * J_e)
+    P += pressure[..., None, None] * cof
+    return psi + 0.5 * k * (J_bar - 1) ** 2, P, p * (J - J_bar)
 
 
 def _of_sheet(material: Material, F: np.ndarray, gamma: np.ndarray,

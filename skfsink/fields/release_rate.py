@@ -113,14 +113,14 @@ def energy_release_rate(body: Body, state: State, tip: np.ndarray, direction: np
     _check_forces(momentum, state, domain, at)
     elements = domain.elements
     gamma = momentum.effective(state.gamma, state.deleted, elements)
-    stress = point_stress(momentum, state.u, elements, gamma)
     w, dN = space.w[elements], space.slopes(elements)
+    stress = point_stress(momentum, state.u, elements, gamma, dN)
     dq = (domain.q[:, None, None] @ dN)[..., 0, :]
     dq *= w[..., None]
     static = -np.einsum("eqKJ,eqJ->K", stress.tensor, dq) / domain.thickness
     static[0] -= float(np.einsum("eq,eq->", stress.around, domain.around)) / domain.thickness
     rho = gamma * (momentum.rho0[elements] if isinstance(momentum.rho0, np.ndarray) else momentum.rho0)
-    kinetic, inertia = _inertia(space, state, domain, stress.H, rho)
+    kinetic, inertia = _inertia(space, state, domain, (dN, stress.H), rho)
     vector = static + (inertia - np.einsum("eq,eqK->K", kinetic, dq)) / domain.thickness
     vector[0] -= float(np.einsum("eq,eq->", kinetic, domain.around)) / domain.thickness
     if not np.isfinite(vector).all():
@@ -194,9 +194,9 @@ def _domain(space: Space, tip: np.ndarray, front: np.ndarray | None, radius: flo
             q[inside[label != nearest]] = 0.0
             near = along[(q > 0) & (r <= max(r[q > 0].min(initial=np.inf) * 1.01, 0.25 * radius))]
             thickness = float(np.ptp(near)) if near.size else 0.0
-    at_nodes = q[space.conn]
-    elements = np.flatnonzero((at_nodes > 0).any(axis=1))
-    whole = (at_nodes[elements] == 1).all(axis=1).sum()
+    elements = np.flatnonzero(np.logical_or.reduce([(q > 0)[nodes] for nodes in space.conn.T]))
+    at_nodes = q[space.conn[elements]]
+    whole = (at_nodes == 1).all(axis=1).sum()
     if whole < 4 or thickness <= 0.0:
         raise ParameterError(f"the domain of {radius:.4g} mm around the tip at {place_text(tip)} mm has {int(whole)} "
                              f"elements within half of the radius, and needs 4: give a greater radius, or a tip in "
@@ -207,40 +207,41 @@ def _domain(space: Space, tip: np.ndarray, front: np.ndarray | None, radius: flo
             raise ParameterError(f"the domain of {radius:.4g} mm around the tip at {place_text(tip)} mm reaches the "
                                  f"axis of revolution: give a smaller radius")
         thickness = 2.0 * np.pi * float(tip[0])
-        around = space.w[elements] * np.einsum("ea,eqa->eq", at_nodes[elements], space.around[elements])
-    return _Domain(elements, at_nodes[elements], thickness, around)
+        around = space.w[elements] * np.einsum("ea,eqa->eq", at_nodes, space.around[elements])
+    return _Domain(elements, at_nodes, thickness, around)
 
 
-def _inertia(space: Space, state: State, domain: _Domain, H: np.ndarray,
+def _inertia(space: Space, state: State, domain: _Domain, gradients: tuple[np.ndarray, np.ndarray],
              rho: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """gamma-weighted kinetic energy at the Gauss points (m, nq) [MPa], and int rho (a u,_k - v v,_k) q (dim,).
 
+    `gradients` are those of the shape functions and Grad u there.
     |v|^2/2 is interpolated from its values at the nodes, as the lumped mass has it, and the sink that takes it: across
     an element that fails the velocities of the two lips are opposite.
     """
-    nodes = space.conn[domain.elements]
+    nodes, (dN, H) = space.conn[domain.elements], gradients
     v, a = state.v[nodes], state.a[nodes]
     if not (v.any() or a.any()):
         return np.zeros_like(rho), np.zeros(space.dim)
     half = 0.5 * np.einsum("eai,eai->ea", v, v)
     push = np.einsum("eqi,eqiK->eqK", space.N @ a, H)
-    push -= (half[:, None, None] @ space.slopes(domain.elements))[..., 0, :]
+    push -= (half[:, None, None] @ dN)[..., 0, :]
     weight = space.w[domain.elements] * rho * (domain.q @ space.N.T)
     return rho * (half @ space.N.T), np.einsum("eq,eqK->K", weight, push)
 
 
 def _strain(stress: PointStress, gamma: np.ndarray, domain: _Domain) -> float:
     """Greatest principal Green strain, in amount, of the points that bear, in the elements where q changes."""
-    rows = (domain.q < 1).any(axis=1)
-    H = stress.H[rows][gamma[rows] > 0.5]
+    bears = (gamma > 0.5) & np.any(domain.q < 1, axis=1, keepdims=True)
+    H = stress.H[bears]
     if not H.size:
         return 0.0
-    E = 0.5 * (H + np.swapaxes(H, -1, -2) + np.swapaxes(H, -1, -2) @ H)
     if H.shape[-1] == 3:
+        E = 0.5 * (H + np.swapaxes(H, -1, -2) + np.swapaxes(H, -1, -2) @ H)
         return float(np.abs(np.linalg.eigvalsh(E)).max())
-    around = stress.strain[rows][gamma[rows] > 0.5]
-    middle = 0.5 * (E[..., 0, 0] + E[..., 1, 1])
-    in_plane = (np.abs(middle) + np.hypot(0.5 * (E[..., 0, 0] - E[..., 1, 1]), E[..., 0, 1])).max()
+    around, (ux, uy, vx, vy) = stress.strain[bears], H.reshape(-1, 4).T
+    one, other = ux + 0.5 * (ux * ux + vx * vx), vy + 0.5 * (uy * uy + vy * vy)
+    in_plane = (0.5 * np.abs(one + other) + 0.5 * np.hypot(one - other, uy + vx + ux * uy + vx * vy)).max()
     return float(max(in_plane, np.abs(around + 0.5 * around**2).max()))
 
 

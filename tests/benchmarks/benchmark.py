@@ -30,6 +30,7 @@ import skfem
 from bodies import held_body
 from limits import FORCE_BYTES, STEP_BYTES, limits, reached
 
+from skfsink.cases.single_edge_notch import single_edge_notch
 from skfsink.fem import kernels
 from skfsink.fem.forms import momentum_forms
 from skfsink.fem.pattern import Pattern
@@ -41,7 +42,9 @@ from skfsink.loads.follower import FollowerLoads
 from skfsink.material import AAA, SinkLaw
 from skfsink.meshing.sample import Sample, load_sample
 from skfsink.methods.explicit import Explicit
+from skfsink.run.observers.release import EnergyRelease
 from skfsink.scene.deck import read_deck
+from skfsink.scene.options import Options
 from skfsink.study.machine import machine
 
 HERE = Path(__file__).resolve().parent
@@ -222,11 +225,24 @@ def dog_bone() -> dict[str, Any]:
 
 def pressure() -> dict[str, Any]:
     """Shares of the event of the aneurysm that its pressure takes, which acts in the tear as well, on one core."""
-    return {mesh: _pressure(mesh) for mesh in ("coarse", "fine")} | {"target": "share <= 0.05"}
+    decks = HERE.parents[1] / "cases" / "aneurysm"
+    methods = ("add_force", "work", "keep", "at", "stiffest")
+    return {"coarse": _share(FollowerLoads, methods, lambda out: read_deck(decks / "scene.toml").run(**out)),
+            "fine": _share(FollowerLoads, methods, lambda out: read_deck(decks / "fine.toml").run(**out)),
+            "target": "share <= 0.05"}
 
 
-def _pressure(mesh: str) -> dict[str, Any]:
-    spent = dict.fromkeys(("add_force", "work", "keep", "at", "stiffest"), 0.0)
+def release_rate() -> dict[str, Any]:
+    """Share of the event of the plate on M3 that its energy release rate takes with a look each microsecond."""
+    def run(out: dict[str, Any]) -> None:
+        single_edge_notch(mesh="M3", options=Options(observers=(EnergyRelease(1e-6),), **out))
+
+    return {**_share(EnergyRelease, ("look",), run), "target": "share <= 0.05"}
+
+
+def _share(kind: type, names: tuple[str, ...], run: Callable[[dict[str, Any]], Any]) -> dict[str, Any]:
+    """Share of the event of a run that some methods take, on one core, when all is compiled."""
+    spent = dict.fromkeys(names, 0.0)
 
     def watched(name: str, method: Callable[..., Any]) -> Callable[..., Any]:
         def call(*arguments: Any) -> Any:
@@ -238,23 +254,22 @@ def _pressure(mesh: str) -> dict[str, Any]:
         return call
 
     def begin(integrator: Explicit, *arguments: Any) -> Any:
-        spent.update(dict.fromkeys(spent, 0.0))
+        spent.update(dict.fromkeys(names, 0.0))
         return start_of_event(integrator, *arguments)
 
-    start_of_event, methods = Explicit.begin, {name: getattr(FollowerLoads, name) for name in spent}
-    deck = HERE.parents[1] / "cases" / "aneurysm" / {"coarse": "scene.toml", "fine": "fine.toml"}[mesh]
+    start_of_event, methods = Explicit.begin, {name: getattr(kind, name) for name in names}
     try:
         Explicit.begin = begin  # type: ignore[assignment, method-assign]
         for name, method in methods.items():
-            setattr(FollowerLoads, name, watched(name, method))
-        for _ in range(2 if mesh == "coarse" else 1):  # the first compiles
-            with tempfile.TemporaryDirectory() as folder:
-                read_deck(deck).run(out=Path(folder) / "run", quiet=True, threads=1)
-                summary = json.loads((Path(folder) / "run" / "summary.json").read_text())
+            setattr(kind, name, watched(name, method))
+        with tempfile.TemporaryDirectory() as folder:
+            for time_of in ("compiled", "counted"):
+                run({"out": Path(folder) / time_of, "quiet": True, "threads": 1})
+            summary = json.loads((Path(folder) / time_of / "summary.json").read_text())
     finally:
         Explicit.begin = start_of_event  # type: ignore[method-assign]
         for name, method in methods.items():
-            setattr(FollowerLoads, name, method)
+            setattr(kind, name, method)
     event = summary["cost"]["wall_s"]["event"]
     return {"elements": summary["elements"], "event_s": event, "spent_s": spent, "share": sum(spent.values()) / event}
 
@@ -281,7 +296,7 @@ def start_up() -> dict[str, Any]:
 
 
 ALL = {f.__name__: f for f in (tangent, machine_limits, step, gamma, start_up, run_M3, event_M4, event_M4_one_thread,
-                               memory_M5, quasistatic_M4, hht_M3, dog_bone, pressure)}
+                               memory_M5, quasistatic_M4, hht_M3, dog_bone, pressure, release_rate)}
 
 
 def main(names: list[str]) -> None:
