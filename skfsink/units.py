@@ -13,7 +13,7 @@ from typing import Annotated, Any, get_args, get_origin
 
 from .errors import ParameterError
 
-__all__ = ["MMHG", "Unit", "in_unit", "kind_and_unit", "number_in"]
+__all__ = ["MMHG", "Unit", "in_unit", "kind_and_unit", "measures", "number_in"]
 
 MMHG = 7500.6157584566  #: mmHg in a MPa
 LONGEST = 80  # characters of a quantity
@@ -80,6 +80,15 @@ def in_unit(name: str, text: str, unit: str, plain: bool = False) -> float:
     except ValueError as error:
         raise ParameterError(f"{name} must be {wanted}, such as {_example(unit)}; got {text[:LONGEST]!r}"
                              + (f" ({error})" if str(error) else "")) from None
+
+
+def measures(text: str, unit: str) -> bool:
+    """Whether a text, such as "5 mm", is a quantity that has a number in `unit`."""
+    try:
+        in_unit("", text, unit)
+    except ParameterError:
+        return False
+    return True
 
 
 def number_in(name: str, value: Any, unit: str) -> Any:

@@ -273,8 +273,11 @@ def tomllib_text(data: dict[str, Any]) -> str:
     ("[[grips]]\nboundary = 'top'\ny = [[0, 0], [0, 1]]", "times of a ramp must ascend; got 0, 0"),
     ("[[grips]]\nboundary = 'top'\ny = [0, 1]", "a ramp has 2 to 1000 points"),
     ("[[grips]]\nboundary = 'top'\ny = nan", "grip top, y must be a finite number"),
-    ("grips = 5", "grips must be tables [[grips]]"), ("[grips]\nboundary = 'top'", "grips must be tables [[grips]]"),
-    ("[[tractions]]\nboundary = 'top'\ny = '1 MPa'", "traction top, y must be a quantity in MPa/s"),
+    ("grips = 5", "grips must be tables [[grips]]"),
+    ("[grips]\nboundary = 'top'", "grips must be tables [[grips]], with two "),
+    ("[[tractions]]\nboundary = 'top'\ny = '1 MPa'", "traction top, y must be a quantity in MPa/s, or a ramp of "
+     "points [time, value] such as [['0 s', '0 MPa'], ['1 s', '1 MPa']]; got '1 MPa'"),
+    ("[[tractions]]\nboundary = 'top'\ny = '1 N'", "traction top, y must be a quantity in MPa/s, such as '1.5 MPa/s'"),
     ("[[regions]]\nname = 'a'\nmaterial = 'steel'", "region a: material must be one of"),
     ("[[regions]]\nname = 'a'\nconstants = 'mu = 1'", "region a: constants 'mu = 1' are those of no law: give a"),
     ("[[regions]]\nname = 'a'\nphi = '1 mm'", "region a, phi must be a quantity in MPa"),

@@ -201,7 +201,12 @@ def test_what_is_no_text(content: bytes, said: str, tmp_path: Path) -> None:
     ("side = 1,5", "decimals stand after a point"), ('side = "1,5 mm"', "decimals stand after a point"),
     ("side = 5 mm", 'text stands in quotes, as in "5 mm"'), ("mesh = M3", "text stands in quotes"),
     ("mesh = “M3”", "write straight quotes"), ('side: "5 mm"', "write = between name and value"),
-    ("mesh = ../a.inp", "text stands in quotes")])
+    ("mesh = ../a.inp", "text stands in quotes"),
+    ('side = 5\nside = 6\n# the end\n', "line 4 gives side a second time: leave one"),
+    ('side = 5\n[parameters]\nside = 6', "line 4 has the table parameters again: leave one, or, where there may be"),
+    ("[[grips]]\nx = 0\n[grips]\nx = 0", "or, where there may be several, write [[grips]] for each"),
+    ("[grips]\nx = 0\n\n  [[ grips ]]  # two\nx = 0", "line 6 has the table grips again"),
+    ("side = 5\nside = [\n 1,\n 2]", "Cannot overwrite a value")])
 def test_usual_mistakes_have_their_cure(line: str, said: str, tmp_path: Path) -> None:
     """Fails if a mistake that people make in decks is refused without saying what to write instead."""
     with pytest.raises(ParameterError) as error:

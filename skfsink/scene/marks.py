@@ -10,7 +10,7 @@ from ..errors import ParameterError, require
 from ..loads.curve import Curve
 from ..loads.grips import Ramp
 from ..system.files import path_of
-from ..units import number_in
+from ..units import measures, number_in
 from .course_file import SUFFIX, read_course
 
 __all__ = ["MOST", "Course", "Direction", "Place", "PressureCourse", "Still", "Vector", "Way", "plain"]
@@ -39,6 +39,9 @@ class Course:
         if isinstance(value, str) and value.lower().endswith(SUFFIX):
             value = read_course(path_of("", value), self.unit, MOST)
         if not isinstance(value, list | tuple):
+            if isinstance(value, str) and measures(value, self.unit):
+                raise ParameterError(f" must be a quantity in {self.rate}, or a ramp of points [time, value] such as "
+                                     f"[['0 s', '0 {self.unit}'], ['1 s', {value!r}]]; got {value!r:.80}")
             return require("", number_in("", value, self.rate), self.rate)
         if len(value) > MOST or not all(isinstance(point, list | tuple) and len(point) == 2 for point in value):
             raise ParameterError(f": a ramp has 2 to {MOST} points [time, value]; got {value!r:.80}")

@@ -99,6 +99,9 @@ def read_tables(kind: str, tables: Any) -> tuple[dict[str, Any], ...]:
     ParameterError
         They are no such tables; the message says which and why.
     """
+    if isinstance(tables, Mapping):
+        raise ParameterError(f"{kind} must be tables [[{kind}]], with two brackets each, as there may be several; got "
+                             f"{tables!r:.80}")
     if not isinstance(tables, list | tuple) or len(tables) > MOST:
         raise ParameterError(f"{kind} must be tables [[{kind}]], at most {MOST}; got {tables!r:.80}")
     read = [RECORDS[kind].read(_table(table)) for table in tables]

@@ -71,8 +71,8 @@ def varied(name: str, deck: Deck) -> Varied:
     if kind in case.tables and (tables := deck.parameters.get(kind, ())):
         return _of_table(name, kind, _which(name, len(tables)), tail)
     others = f"; constants of {law} are {', '.join(constants)}" if constants else ""
-    raise ParameterError(f"--vary {plain if not dot else name}: there is no such parameter; `skfsink show CASE` lists "
-                         f"them{others}")
+    raise ParameterError(f"--vary {plain if not dot else name}: there is no such parameter; `skfsink show "
+                         f"{deck.case}` lists them{others}")
 
 
 def _parameter(case: Case, name: str) -> Varied:
