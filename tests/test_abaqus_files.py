@@ -197,6 +197,14 @@ def test_elements_that_are_refused(kind: str, part: str, tmp_path: Path) -> None
     assert part in refused(tmp_path, PLATE.replace("CPE4", kind))
 
 
+def test_sets_without_members_are_named(tmp_path: Path) -> None:
+    """Fails if a set that the file declares and leaves empty is left out in silence."""
+    mesh = read(tmp_path, PLATE + "*Nset, nset=hole\n*Elset, elset=Core\n**\n")
+    is_plate(mesh)
+    assert "the node set 'hole' is empty, and is left out" in notes(mesh) and "hole" not in mesh.point_sets
+    assert "the element set 'Core' is empty, and is left out" in notes(mesh) and "Core" not in mesh.cell_sets
+
+
 def test_elements_that_are_no_body(tmp_path: Path) -> None:
     """Fails if springs, masses, … end the reading, are left out in silence, or stay in sets; edges are boundaries."""
     mesh = read(

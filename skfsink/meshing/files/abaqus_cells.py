@@ -182,12 +182,20 @@ class Cells:
         sets = {}
         for name, of in names["element_sets"]:
             elements = np.unique(np.concatenate([self.body.element_set(at, named.name) for at, named in of]))
+            if not len(elements):
+                self.notes.append(f"the element set {name[:60]!r} is empty, and is left out")
+                continue
             sets[name] = self._members(elements)
-            if len(elements) and not any(map(len, sets[name].values())):
+            if not any(map(len, sets[name].values())):
                 del sets[name]
                 self.notes.append(f"the element set {name[:60]!r} has only elements that are left out, and so is it")
-        points = {name: np.unique(np.concatenate([self.body.node_set(at, named.name) for at, named in of]))
-                  for name, of in names["node_sets"]}
+        points = {}
+        for name, of in names["node_sets"]:
+            nodes = np.unique(np.concatenate([self.body.node_set(at, named.name) for at, named in of]))
+            if len(nodes):
+                points[name] = nodes
+            else:
+                self.notes.append(f"the node set {name[:60]!r} is empty, and is left out")
         for name, of in names["surfaces"]:
             self._surface(name, of, names["surfaces"], sets, points)
         cells = [(cell, np.concatenate(self.facets[cell]) if i >= self.n_body else data)
