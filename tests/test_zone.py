@@ -8,7 +8,7 @@ from bodies import box
 
 from skfsink.fem.amg import residual
 from skfsink.fem.space import Space
-from skfsink.fields.active_zone import ActiveZone
+from skfsink.fields.active_zone import ActiveZone, _deepen
 from skfsink.fields.density import Density, DensitySolver
 from skfsink.material import SinkLaw
 from skfsink.methods.explicit import Explicit
@@ -30,6 +30,25 @@ def history(space: Space, *tips: float) -> np.ndarray:
     for tip, y in zip(tips, (0.3, 0.8)):
         W[(abs(middle[:, 1] - y) < 0.01) & (middle[:, 0] < tip)] = 1.0
     return W
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("share", [0.02, 0.3])
+def test_depths_are_the_distances_from_the_end_of_the_zone(dim: int, share: float):
+    """Fails if a cell is left out or not as deep as its sources make it, or a zone that is too large is not refused."""
+    rng = np.random.default_rng(dim)
+    centres = np.unique(rng.integers(0, 20, (600, dim)), axis=0) * 0.1
+    sizes = rng.integers(0, 9, len(centres))
+    need = np.where(rng.random(len(centres)) < share, rng.uniform(0.01, 0.3, len(centres)), 0.0)
+    apart = np.linalg.norm(centres[:, None] - centres, axis=2)
+    expected = np.where(need > 0, need + 0.2 - apart, 0.0).max(axis=1).clip(0.0)
+    inside = sizes[expected > 0].sum() / sizes.sum()
+    assert 0.05 < inside < 1.0 or share > 0.1
+    for most, whole in ((inside + 1e-6, True), (inside - 1e-6, False), (1.0, True)):
+        depth = np.zeros(len(centres))
+        assert _deepen(centres, need, 0.2, sizes, most, depth) == whole
+        if whole:
+            np.testing.assert_allclose(depth, expected, atol=1e-14)
 
 
 def run(space: Space, solver: DensitySolver, density: Density, *tips: tuple[float, float]) -> Density:

@@ -81,7 +81,7 @@ class ActiveZone:
         self._centres = width * np.ascontiguousarray(cells)
         self._cell = places.ravel()[first:first + len(own)][cell.ravel()]
         self._counted = exchange.counts(len(X))
-        self._size = exchange.total(int(self._counted.sum()))
+        self._sizes = exchange.sums(np.bincount(self._cell[self._counted], minlength=len(cells)))  # in nodes
         self.solves = self.misses = self.choices = 0
         self.residual = 0.0
 
@@ -126,8 +126,7 @@ class ActiveZone:
         if fit:
             return min(fit, key=lambda zone: zone.size)
         depth = np.zeros_like(need)
-        _deepen(self._centres, np.flatnonzero(need), need, self.MARGIN * self._l, depth)
-        if self._size_of(depth) > self.MOST * self._size:
+        if not _deepen(self._centres, need, self.MARGIN * self._l, self._sizes, self.MOST, depth):
             return None
         self.choices += 1
         return self.of_depth(depth)
@@ -139,7 +138,7 @@ class ActiveZone:
 
     def _size_of(self, depth: np.ndarray) -> float:
         """Number of nodes in the whole body whose cells have a depth."""
-        return self._exchange.total(int(np.count_nonzero(depth[self._cell[self._counted]])))
+        return float(self._sizes[depth > 0].sum())
 
 
 @njit(cache=True)
@@ -172,14 +171,25 @@ def _reach(r, cell, sizes, radius, decade, need):  # type: ignore[no-untyped-def
 
 
 @njit(cache=True)
-def _deepen(centres, sources, need, margin, depth):  # type: ignore[no-untyped-def]
-    """Depth of all cells in the zone that reaches `need` and `margin` farther around each source."""
-    for s in sources:
+def _deepen(centres, need, margin, sizes, most, depth):  # type: ignore[no-untyped-def]
+    """Depth of all cells in the zone that reaches `need` and `margin` farther around each cell with a need.
+
+    `centres` ascend along the first axis. False as soon as the zone has more than a share `most` of all nodes, of which
+    a cell has `sizes`.
+    """
+    left = most * sizes.sum()
+    for s in np.flatnonzero(need):
         reach = need[s] + margin
-        for c in range(depth.size):
+        first, end = np.searchsorted(centres[:, 0], np.array([centres[s, 0] - reach, centres[s, 0] + reach]))
+        for c in range(first, end):
             square = 0.0
             for i in range(centres.shape[1]):
                 square += (centres[c, i] - centres[s, i]) ** 2
             least = reach - depth[c]
             if least > 0.0 and square < least * least:
+                if depth[c] == 0.0:
+                    left -= sizes[c]
                 depth[c] = reach - np.sqrt(square)
+        if left < 0.0:
+            return False
+    return True
