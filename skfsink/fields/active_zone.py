@@ -177,19 +177,22 @@ def _deepen(centres, need, margin, sizes, most, depth):  # type: ignore[no-untyp
     `centres` ascend along the first axis. False as soon as the zone has more than a share `most` of all nodes, of which
     a cell has `sizes`.
     """
-    left = most * sizes.sum()
-    for s in np.flatnonzero(need):
-        reach = need[s] + margin
-        first, end = np.searchsorted(centres[:, 0], np.array([centres[s, 0] - reach, centres[s, 0] + reach]))
-        for c in range(first, end):
-            square = 0.0
-            for i in range(centres.shape[1]):
-                square += (centres[c, i] - centres[s, i]) ** 2
-            least = reach - depth[c]
-            if least > 0.0 and square < least * least:
-                if depth[c] == 0.0:
-                    left -= sizes[c]
-                depth[c] = reach - np.sqrt(square)
-        if left < 0.0:
-            return False
+    left, sources = most * sizes.sum(), np.flatnonzero(need)
+    if sizes[sources].sum() > left:
+        return False
+    for first in range(16):  # far from each other at first: a large zone is soon known to be one
+        for s in sources[first::16]:
+            reach = need[s] + margin
+            near, far = np.searchsorted(centres[:, 0], np.array([centres[s, 0] - reach, centres[s, 0] + reach]))
+            for c in range(near, far):
+                square = 0.0
+                for i in range(centres.shape[1]):
+                    square += (centres[c, i] - centres[s, i]) ** 2
+                least = reach - depth[c]
+                if least > 0.0 and square < least * least:
+                    if depth[c] == 0.0:
+                        left -= sizes[c]
+                    depth[c] = reach - np.sqrt(square)
+            if left < 0.0:
+                return False
     return True
