@@ -65,7 +65,7 @@ class FollowerLoads:
         self._added = np.zeros(len(self.loads))             # to the volumes pumped in, at the start of an event
         self._last: np.ndarray | None = None                # displacement last evaluated
         self.places = np.arange(self._wet.bears.size)
-        self.areas, self._time = self.area(np.zeros_like(space.X)), np.nan
+        self.areas = self.area(np.zeros_like(space.X))
         self.at(0.0)
 
     @property
@@ -91,9 +91,7 @@ class FollowerLoads:
     # --- the loads at a time ---
     def at(self, t: float) -> None:
         """Take the loads of load time `t` [s]."""
-        if t != self._time:
-            self._time, courses = t, map(_course, self.loads)
-            self.values = np.array([course.value(t) if isinstance(course, Ramp) else course * t for course in courses])
+        self.values = np.array([c.value(t) if isinstance(c := _course(load), Ramp) else c * t for load in self.loads])
 
     def rates(self, t: float) -> np.ndarray:
         """Rates of all loads from load time `t` on, (loads,) [MPa/s; mm^volume_dim/s]."""
