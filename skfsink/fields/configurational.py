@@ -82,13 +82,13 @@ def configurational_forces(momentum: Momentum, u: np.ndarray) -> np.ndarray:
 
 
 def point_stress(momentum: Momentum, u: np.ndarray, elements: np.ndarray, gamma: np.ndarray,
-                 dN: np.ndarray) -> PointStress:
+                 dN: np.ndarray | None = None) -> PointStress:
     """Energy and stress of `elements` (m,) at the displacement `u` (n, dim), for the density `gamma` (m, nq).
 
-    `dN` are their :meth:`.Space.slopes`.
+    `dN` are their :meth:`.Space.slopes`, if they are at hand.
     """
     space, dim = momentum.space, momentum.space.dim
-    H = np.swapaxes(u[space.conn[elements]], 1, 2)[:, None] @ dN
+    H = np.swapaxes(u[space.conn[elements]], 1, 2)[:, None] @ (space.slopes(elements) if dN is None else dN)
     F = np.zeros((*gamma.shape, 3, 3))
     F[..., :dim, :dim] = H
     F[..., range(3), range(3)] += 1.0
