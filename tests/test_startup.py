@@ -96,6 +96,14 @@ def copied(folder: Path) -> Path:
     return folder
 
 
+def test_units_as_the_program_has_them_are_read_without_a_library() -> None:
+    """Fails if a grip in mm/s makes a start load pint, which takes half a second."""
+    probe = ("import sys; from skfsink.scene.tables import read_tables; "
+             "read_tables('grips', [{'boundary': 'top', 'y': '1 mm/s'}]); print('pint' in sys.modules)")
+    ran = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=True)
+    assert ran.stdout.strip() == "False"
+
+
 @pytest.mark.slow
 def test_a_change_in_an_imported_module_is_seen(tmp_path: Path) -> None:
     """Fails if a loop is read from the cache although what was built into it has changed in another file.

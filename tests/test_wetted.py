@@ -20,6 +20,7 @@ def space(request: pytest.FixtureRequest) -> Space:
 
 
 def test_sides_have_the_nodes_of_the_mesh_and_their_normals_outwards(space: Space):
+    """Fails if a side gets the nodes of another one, or a normal into its element."""
     numbers = np.arange(space.mesh.nfacets)
     for side in (0, 1):
         there = numbers[space.mesh.f2t[side] >= 0]
@@ -38,6 +39,7 @@ def test_sides_have_the_nodes_of_the_mesh_and_their_normals_outwards(space: Spac
 
 
 def test_elements_without_force(space: Space):
+    """Fails if an element that bears force at one Gauss point is left out, or one that is deleted is not."""
     rng = np.random.default_rng(3)
     gamma = rng.choice([0.2, 0.45, 0.55, 1.0], space.n_nodes, p=[0.6, 0.2, 0.1, 0.1])
     deleted = rng.random(space.n_elements) < 0.1
@@ -50,6 +52,7 @@ def test_elements_without_force(space: Space):
 
 @pytest.mark.parametrize("share", [0.3, 0.5, 0.7])
 def test_lips_are_reached_over_sides(space: Space, share: float):
+    """Fails if the failed region ends early, goes on over corners, or a lip is put on the wrong element."""
     rng = np.random.default_rng(5)
     gone = rng.random(space.n_elements) < share
     start = np.flatnonzero(gone)[[0, -1, 0]]

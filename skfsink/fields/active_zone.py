@@ -134,11 +134,7 @@ class ActiveZone:
     def of_depth(self, depth: np.ndarray) -> Zone:
         """The zone with these depths of the cells [mm], as a checkpoint keeps them."""
         nodes = np.flatnonzero(depth[self._cell])
-        return Zone(depth, nodes, self._size_of(depth), self._solver.restricted(nodes))
-
-    def _size_of(self, depth: np.ndarray) -> float:
-        """Number of nodes in the whole body whose cells have a depth."""
-        return float(self._sizes[depth > 0].sum())
+        return Zone(depth, nodes, float(self._sizes[depth > 0].sum()), self._solver.restricted(nodes))
 
 
 @njit(cache=True)

@@ -39,10 +39,14 @@ class Course:
         if isinstance(value, str) and value.lower().endswith(SUFFIX):
             value = read_course(path_of("", value), self.unit, MOST)
         if not isinstance(value, list | tuple):
-            if isinstance(value, str) and measures(value, self.unit):
-                raise ParameterError(f" must be a quantity in {self.rate}, or a ramp of points [time, value] such as "
-                                     f"[['0 s', '0 {self.unit}'], ['1 s', {value!r}]]; got {value!r:.80}")
-            return require("", number_in("", value, self.rate), self.rate)
+            try:
+                return require("", number_in("", value, self.rate), self.rate)
+            except ParameterError:
+                if isinstance(value, str) and measures(value, self.unit):
+                    raise ParameterError(f" must be a quantity in {self.rate}, or a ramp of points [time, value] such "
+                                         f"as [['0 s', '0 {self.unit}'], ['1 s', {value!r}]]; got {value!r:.80}"
+                                         ) from None
+                raise
         if len(value) > MOST or not all(isinstance(point, list | tuple) and len(point) == 2 for point in value):
             raise ParameterError(f": a ramp has 2 to {MOST} points [time, value]; got {value!r:.80}")
         times, values = ([require("", number_in("", point[i], unit), unit) for point in value]

@@ -68,20 +68,20 @@ def read_toml(path: Path) -> dict[str, Any]:
         message = str(error).splitlines()[0]
         at = re.search(r"at line (\d+)", message)
         lines = text.split("\n")
-        if again := _again(message, lines):
+        if message.startswith(("Cannot overwrite", "Cannot declare")) and (again := _again(at and int(at[1]), lines)):
             raise ValueError(again) from None
         line = lines[min(int(at[1]), len(lines)) - 1] if at else ""
         cure = next((f": {cure}" for pattern, cure in CURES if pattern.search(line)), "")
         raise ValueError(message + cure) from None
 
 
-def _again(message: str, lines: list[str]) -> str:
-    """What is there twice in a TOML file, of which a line says so; "" if it is not that."""
-    if not message.startswith(("Cannot overwrite", "Cannot declare")):
-        return ""
-    written = [number for number, line in enumerate(lines, 1) if line.strip() and not line.lstrip().startswith("#")]
-    at = re.search(r"at line (\d+)", message)
-    number = int(at[1]) if at else written[-1]
+def _again(number: int | None, lines: list[str]) -> str:
+    """What a line of a TOML file has for the second time; "" if it begins with neither a key nor a table.
+
+    Without a `number` it is the last one that has more than a comment.
+    """
+    if number is None:
+        number = max(i for i, line in enumerate(lines, 1) if line.strip() and not line.lstrip().startswith("#"))
     found = re.match(r"""\s*(?:\[+\s*([\w."'-]+)\s*\]|([\w."'-]+)\s*=)""", lines[number - 1])
     if found is None:
         return ""

@@ -1,6 +1,5 @@
-"""The pass that gives the element loops a new relative density, and books the stored energy its fall takes.
-
-And the elements that bear no force at a density.
+"""The pass that gives the element loops a new relative density and books the stored energy its fall takes, and a pass
+that finds the elements without force at a density.
 """
 
 from __future__ import annotations

@@ -196,10 +196,3 @@ def _tangents(nodes, x, q, s, t):  # type: ignore[no-untyped-def]
         for a in range(4):
             s[i] += DS[q, a] * x[nodes[a], i]
             t[i] += DT[q, a] * x[nodes[a], i]
-
-
-@njit(cache=True)
-def _cross(s, t, n):  # type: ignore[no-untyped-def]
-    n[0] = s[1] * t[2] - s[2] * t[1]
-    n[1] = s[2] * t[0] - s[0] * t[2]
-    n[2] = s[0] * t[1] - s[1] * t[0]
