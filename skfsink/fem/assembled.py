@@ -15,7 +15,7 @@ is.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -144,6 +144,17 @@ class AssembledMomentum:
             least = min(least, float(kinematics(_extra(fields)).J.min(where=fields["gamma"] > 0.0, initial=1.0)))
         out[...] = total.reshape(u.shape)
         return least
+
+    def along(self, u: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+        """The derivative of the force; see :class:`.MomentumBackend`."""
+        pattern = Pattern(self._space, self._space.dim)
+        tangent = pattern.matrix(self.tangent(pattern, u, self.gamma, False))
+
+        def derivative(d: np.ndarray) -> np.ndarray:
+            change: np.ndarray = (tangent @ d.ravel()).reshape(d.shape)
+            return change
+
+        return derivative
 
     @property
     def energy(self) -> float:

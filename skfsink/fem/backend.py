@@ -78,6 +78,13 @@ class MomentumBackend(Protocol):
         Returns the least J at a Gauss point with gamma > 0, at the most 1.
         """
 
+    def along(self, u: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+        """The derivative of that force at `u`, as a function of a displacement (n, dim).
+
+        It is of the density at the time of the call, and valid until this changes. What `force` has left is not
+        touched.
+        """
+
     @property
     def energy(self) -> float:
         """gamma-weighted stored energy at the last evaluation [N mm; N mm/mm in 2D]."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -43,6 +43,10 @@ class CompiledMomentum:
     def force(self, u: np.ndarray, out: np.ndarray) -> float:
         """Internal force; see :class:`.MomentumBackend`."""
         return self.tiles.force(self._space.X + u, self._laws, out, self._j_bar)
+
+    def along(self, u: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+        """Its derivative without a matrix; see :class:`.MomentumBackend`."""
+        return self.tiles.along(self._space.X + u, self._laws, self._j_bar)
 
     @property
     def energy(self) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -303,6 +303,20 @@ class Momentum:
         if self.followers is not None and not convex:
             self.followers.add_stiffness(pattern, u, data)
         return self._constrained(pattern, data)
+
+    def along(self, u: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+        """:meth:`tangent` as a function of a displacement (n, dim) [mm], for bodies too large for its matrix.
+
+        It gives forces [N; N/mm in 2D], of a part of a body its share of them, until the density changes.
+        """
+        inner, loads = self.backend.along(u), None if self.followers is None else self.followers.along(u)
+
+        def derivative(d: np.ndarray) -> np.ndarray:
+            d = self.unheld(d)
+            change = inner(d)
+            return self.unheld(change if loads is None else change + loads(d))
+
+        return derivative
 
     def stiffest(self, u: np.ndarray, inverse_mass: np.ndarray) -> float:
         """Cheap indicator of the highest frequency squared at `u`, and below it [1/s^2].

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from copy import copy
 
 import numpy as np
@@ -191,12 +191,27 @@ class FollowerLoads:
 
     def add_stiffness(self, pattern: Pattern, u: np.ndarray, data: np.ndarray) -> None:
         """Add the symmetric part of the load stiffness at `u`, at fixed pressures, to `data` on the `pattern`."""
-        K = self._tangents(u, self.pressures(u))
-        K = 0.5 * (K + K.transpose(0, 2, 1))
+        K = self._stiffness(u)
         slot = pattern.slot[self._wet.facets.elements[:, None, None], self._unknowns[:, :, None],
                             self._unknowns[:, None, :]]
         there = slot >= 0
         np.add.at(data, slot[there], K[there])
+
+    def along(self, u: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+        """That part as a function of a displacement (n, dim) [mm], which gives forces [N; N/mm in 2D]."""
+        K, nodes = self._stiffness(u), self._wet.facets.nodes
+
+        def derivative(d: np.ndarray) -> np.ndarray:
+            change, own = np.zeros_like(d), d[nodes]
+            np.add.at(change, nodes, np.einsum("fij,fj->fi", K, own.reshape(len(K), -1)).reshape(own.shape))
+            return change
+
+        return derivative
+
+    def _stiffness(self, u: np.ndarray) -> np.ndarray:
+        """Symmetric parts of the load stiffness of the facets at `u`, at fixed pressures, (f, k*dim, k*dim)."""
+        K = self._tangents(u, self.pressures(u))
+        return 0.5 * (K + K.transpose(0, 2, 1))
 
     @property
     def _unknowns(self) -> np.ndarray:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import scipy.linalg as la
 
@@ -14,23 +16,28 @@ from ..system.jit import njit
 
 __all__ = ["highest_damping", "highest_frequency", "stable_step"]
 
+#: following = A v - beta previous, of v, previous, beta and following; of a part of a body its share
+Product = Callable[[np.ndarray, np.ndarray, float, np.ndarray], None]
+
 STEPS = 60      # of Lanczos's method, whose vectors are kept
 RESTARTS = 20   # from what they have found
 
 
-def highest_frequency(momentum: Momentum, pattern: Pattern, free: np.ndarray, u: np.ndarray, mass: np.ndarray,
+def highest_frequency(momentum: Momentum, pattern: Pattern | None, free: np.ndarray, u: np.ndarray, mass: np.ndarray,
                       start: np.ndarray | None = None, *, tolerance: float = 1e-3) -> tuple[float, np.ndarray]:
     """Highest eigenfrequency omega [rad/s] of  K(u) x = omega^2 M x  over the free unknowns, and its vector.
 
-    Lanczos on the mass-scaled tangent of the deformed, damaged body. `start` is a starting vector, best the result of
-    the last call. The estimate approaches from below, by about `tolerance`. Nodes without mass do not swing. Contact is
-    not in it.
+    Lanczos on the mass-scaled tangent of the deformed, damaged body, assembled on a `pattern` or, without one, by
+    differences of forces. `start` is a starting vector, best the result of the last call. The estimate approaches from
+    below, by about `tolerance`. Nodes without mass do not swing. Contact is not in it.
     """
     unknowns = momentum.space.exchange.over(free)
     if not unknowns.size:  # every node is held: nothing swings
         return 0.0, np.zeros(0)
-    by_dof = np.repeat(mass, momentum.space.dim)[free]
-    square, mode = _greatest(unknowns, (pattern, momentum.tangent(pattern, u)), by_dof, start, tolerance)
+    scale = _inverse_root(np.repeat(mass, momentum.space.dim)[free])
+    product = (_by_forces(momentum, free, u, scale, unknowns) if pattern is None else
+               _by_matrix(pattern, momentum.tangent(pattern, u), scale, unknowns))
+    square, mode = _greatest(product, unknowns, start, tolerance)
     return float(np.sqrt(max(square, 0.0))), mode
 
 
@@ -45,7 +52,8 @@ def highest_damping(momentum: Momentum, pattern: Pattern, free: np.ndarray, u: n
     if not unknowns.size:
         return 0.0
     data = momentum.viscous_tangent(pattern, u, np.zeros_like(u), compression)
-    damping, _ = _greatest(unknowns, (pattern, data), np.repeat(mass, momentum.space.dim)[free], None, tolerance)
+    scale = _inverse_root(np.repeat(mass, momentum.space.dim)[free])
+    damping, _ = _greatest(_by_matrix(pattern, data, scale, unknowns), unknowns, None, tolerance)
     return max(damping, 0.0)
 
 
@@ -58,23 +66,49 @@ def stable_step(omega: float, damping: float) -> float:
     return 4.0 / (damping + float(np.hypot(damping, 2.0 * omega)))
 
 
-def _greatest(unknowns: Unknowns, matrix: tuple[Pattern, np.ndarray], mass: np.ndarray, start: np.ndarray | None,
-              tolerance: float) -> tuple[float, np.ndarray]:
-    """Greatest eigenvalue of a `matrix`, pattern and data, over `mass` (size of the pattern), and its vector."""
-    pattern, data = matrix
-    indptr, indices = pattern.indptr.view(np.uint32), pattern.indices.view(np.uint32)
+def _inverse_root(mass: np.ndarray) -> np.ndarray:
+    """1/sqrt(m), 0 without mass."""
     root = np.sqrt(mass)
-    _scale(indptr, indices, data, np.divide(1.0, root, out=np.zeros_like(root), where=root > 0.0))
+    return np.divide(1.0, root, out=np.zeros_like(root), where=root > 0.0)
+
+
+def _by_matrix(pattern: Pattern, data: np.ndarray, scale: np.ndarray, unknowns: Unknowns) -> Product:
+    """Of a matrix on a pattern, scaled in place on both sides."""
+    indptr, indices = pattern.indptr.view(np.uint32), pattern.indices.view(np.uint32)
+    _scale(indptr, indices, data, scale)
+    matrix = Rows(indptr, indices, data)
+
+    def product(v: np.ndarray, previous: np.ndarray, beta: float, following: np.ndarray) -> None:
+        _product(matrix, v, previous, beta, unknowns.counted, following)
+
+    return product
+
+
+def _by_forces(momentum: Momentum, free: np.ndarray, u: np.ndarray, scale: np.ndarray, unknowns: Unknowns) -> Product:
+    """Of the derivative of the force at `u`, scaled on both sides."""
+    derivative, d = momentum.along(u), np.zeros_like(u)
+
+    def product(v: np.ndarray, previous: np.ndarray, beta: float, following: np.ndarray) -> None:
+        d.reshape(-1)[free] = scale * v
+        np.multiply(scale, derivative(d).reshape(-1)[free], out=following)
+        following[unknowns.counted] -= beta * previous[unknowns.counted]
+
+    return product
+
+
+def _greatest(product: Product, unknowns: Unknowns, start: np.ndarray | None,
+              tolerance: float) -> tuple[float, np.ndarray]:
+    """Greatest eigenvalue of a symmetric matrix, of which a `product` is given, and its vector."""
     # The highest mode sits in one element, and the next one may sit in another, where the last result is zero: add
     # a vector that reaches everywhere, has no symmetry, and is the same every time.
     everywhere = np.sin(1.0 + unknowns.numbers * 2.399963) * np.sqrt(2.0 / unknowns.size)
     start = everywhere if start is None else everywhere + start
     start = start / np.sqrt(unknowns.dot(start, start))
-    return _lanczos(Rows(indptr, indices, data), unknowns, start, tolerance)
+    return _lanczos(product, unknowns, start, tolerance)
 
 
-def _lanczos(matrix: Rows, unknowns: Unknowns, start: np.ndarray, tolerance: float) -> tuple[float, np.ndarray]:
-    """Greatest eigenvalue of a symmetric matrix, of which the upper triangle is given, and its vector.
+def _lanczos(product: Product, unknowns: Unknowns, start: np.ndarray, tolerance: float) -> tuple[float, np.ndarray]:
+    """Greatest eigenvalue of a symmetric matrix, and its vector.
 
     Its residual |A x - value x| is at most `tolerance` of it. The vectors lose their orthogonality, which gives an
     eigenvalue that has been found a second time, but none that is wrong.
@@ -88,7 +122,7 @@ def _lanczos(matrix: Rows, unknowns: Unknowns, start: np.ndarray, tolerance: flo
         previous, beta, following = np.zeros_like(start), 0.0, np.empty_like(start)
         while True:
             last_one = kept[count - 1]
-            _product(matrix, last_one, previous, beta, unknowns.counted, following)
+            product(last_one, previous, beta, following)
             unknowns.whole(following)
             alpha = unknowns.total(_along(following, last_one, unknowns.counted))
             beta = float(np.sqrt(unknowns.total(_without(following, last_one, alpha, unknowns.counted))))

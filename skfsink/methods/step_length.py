@@ -47,6 +47,7 @@ class StepLength:
     FED_IN = 1e-6    # energy a step may feed in, of the initial one, before the limit is estimated anew
     CALM = 20        # steps without a rejection after which the step doubles
     COMPRESSED = 1e-3  # compression of an element, L/c_d times its rate, that is counted on at least
+    ASSEMBLED = 300_000  # unknowns up to which a tangent is assembled for the limit, in space of 1.5 kB each
     CUTS = 20        # halvings at which the integration gives up: a millionth of the limit
 
     kept = ("dt", "estimates", "rejected", "cut", "urgent", "_omega", "_indicator0", "_last_estimate", "_calm",
@@ -56,7 +57,9 @@ class StepLength:
         self.momentum, self.free, self.controls = momentum, free, controls
         self._longest = np.inf if controls.gamma_every else longest
         self._still = longest  # where nothing swings
-        self._pattern = Pattern(momentum.space, momentum.space.dim, free, upper=True)
+        space = momentum.space
+        small = momentum.is_viscous or space.exchange.over(free).size <= self.ASSEMBLED
+        self._pattern = Pattern(space, space.dim, free, upper=True) if small else None
         self.dt = 0.0
         self.estimates = self.rejected = self.cut = self._calm = 0
         self._omega = self._indicator0 = self._damping = self._compression = 0.0
@@ -85,7 +88,7 @@ class StepLength:
         if self.mode is None or self.urgent or moved or since >= c.estimate_every:
             self._omega, self.mode = highest_frequency(self.momentum, self._pattern, self.free, u, mass, self.mode)
             self._omega = max(self._omega, indicator**0.5)  # a Rayleigh quotient, in case Lanczos missed that element
-            if self.momentum.is_viscous:
+            if self.momentum.is_viscous and self._pattern is not None:
                 self._compression = max(compression, self.COMPRESSED)
                 self._damping = highest_damping(self.momentum, self._pattern, self.free, u, mass,
                                                 compression=self._compression)
@@ -105,7 +108,7 @@ class StepLength:
         """The step over the stability limit of a body as it is now; nothing is changed."""
         omega, _ = highest_frequency(self.momentum, self._pattern, self.free, u, mass, self.mode)
         omega = self._with_others(max(omega, self.momentum.stiffest(u, inverse) ** 0.5), u, inverse)
-        if self.momentum.is_viscous and omega > 0.0:
+        if self.momentum.is_viscous and self._pattern is not None and omega > 0.0:
             damping = highest_damping(self.momentum, self._pattern, self.free, u, mass, compression=compression)
             return self.dt / stable_step(omega, damping)
         return 0.5 * self.dt * omega

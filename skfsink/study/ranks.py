@@ -35,8 +35,8 @@ __all__ = ["RANKS", "ranks"]
 
 FLAG = Parameter(negative="", show_default=False)
 H = 0.05                    # of the hexahedra [mm]: l/2
-SIZE = {"strong": (50_000, 200_000), "weak": (100_000,)}   # elements: of the body, and of each rank
-COUNTS = {50_000: (1, 2, 4, 8), 200_000: (1, 2, 4)}   # ranks, of each body of strong scaling
+SIZE = {"strong": (50_000, 200_000, 1_000_000), "weak": (100_000,)}   # elements: of the body, and of each rank
+COUNTS = {50_000: (1, 2, 4, 8), 200_000: (1, 2, 4), 1_000_000: (1, 2)}   # ranks, of each body of strong scaling
 EVENT = str(Path(__file__).with_name("ranks_event.py"))
 STEPS = 150                 # about, of the event
 BODIES, CLUSTERS = (10**7, 10**8), (64, 1_024, 16_384)   # hexahedra and cores that are predicted
@@ -193,14 +193,17 @@ def draw(points: Points, path: Path) -> None:
 def table(points: Points) -> list[str]:
     """A row an event."""
     lines = ["| | hexahedra | ranks | steps | solves for γ | time of a step (ms) | "
-             "times as fast | memory of a rank (MB) | *D* (N mm) |", "|---" * 9 + "|"]
+             "times as fast | memory of the first rank, of others (MB) | *D* (N mm) |", "|---" * 9 + "|"]
     for key, p in points.items():
         kind, size, _ = key.split("/")
         one = points.get(f"{kind}/{size}/1")
         grown = p["elements"] / one["elements"] if one else 1.0
+        first, *others = p["peaks_mb"]
+        memories = [first, *([max(others)] if others else [])]
         faster = f"{grown * step_time(one) / step_time(p):.2f}" if one else ""
         lines.append(f"| {kind} | {p['elements']:,} | {p['ranks']} | {p['steps']} | {p['solves']} | "
-                     f"{1e3 * step_time(p):.2f} | {faster} | {max(p['peaks_mb']):,.0f} | {p['D']:.9g} |")
+                     f"{1e3 * step_time(p):.2f} | {faster} | "
+                     f"{', '.join(f'{mb:,.0f}' for mb in memories)} | {p['D']:.9g} |")
     costs = Costs.fitted(points)
     if costs is None:
         return lines

@@ -27,6 +27,9 @@ from typing import Any
 
 import numpy as np
 import skfem
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
 from bodies import held_body
 from limits import FORCE_BYTES, STEP_BYTES, limits, reached
 
@@ -301,6 +304,8 @@ ALL = {f.__name__: f for f in (tangent, machine_limits, step, gamma, start_up, r
 
 def main(names: list[str]) -> None:
     """Measure what is named, or everything, and write it to `results/<processor>.json` beside this file."""
+    if unknown := [name for name in names if name not in ALL]:
+        raise SystemExit(f"benchmark.py: {unknown[0]} is none of {', '.join(ALL)}")
     stamp = machine()
     slug = "".join(c if c.isalnum() else "-" for c in f"{stamp['processor']}-{stamp['cores']}-cores").strip("-").lower()
     path = HERE / "results" / f"{slug}.json"

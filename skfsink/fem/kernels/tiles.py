@@ -12,6 +12,7 @@ Bytes an explicit step has to move for one quadrilateral (hexahedron): 16 (32) c
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
@@ -19,17 +20,20 @@ import numba
 import numpy as np
 
 from ...material import CompiledLaw
-from ...system.jit import njit
 from ..space import Space
 from .faster import Faster
 from .general_sheet_tangent import stiffness_general_sheet
 from .lanes import LANES, LANES_3D
+from .nodal_sums import SUMS
 from .plane_stress import stiffness_plane_stress
 from .records import Elements, Viscous, Volumetric
 from .relax import relax
 from .shared import FORCES, GENERAL_FORCES, VISCOUS, VOLUMETRIC, Loops
 
 __all__ = ["Law", "Tiles"]
+
+AWAKE = 3_000_000  # turns for which a thread waits for the next loop before it sleeps: some milliseconds
+DIFFERENCE = 1e-6  # of the smallest element: displacement of a central difference of forces, at the most
 
 class Law(NamedTuple):
     """Stored energy as the loops take it: psi, its constants, and the bulk modulus [MPa]."""
@@ -96,6 +100,8 @@ class Tiles:
         self._whole = Elements(self.conn, self.geometry, self.gamma, none, self._force, self.W, self.psi)
         most: int = numba.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]
         self.threads = 1 if space.w.size < self.WORTH else min(threads, most)
+        if self.threads > 1:  # read by GNU's OpenMP as it is loaded
+            os.environ.setdefault("GOMP_SPINCOUNT", str(AWAKE))
         self._faster: dict[object, Faster] = {}
         self._viscous: tuple[np.ndarray, list[Elements]] | None = None
         start, entry = space.incidence
@@ -169,8 +175,38 @@ class Tiles:
         for number, (law, part) in enumerate(zip(laws, self._parts)):
             least = min(least, *self._share(part.loops, number, law.psi.address, law.constants,
                                             Volumetric(law.bulk_modulus, j_bar), x, part.elements))
-        _sum_at_nodes(self._force.reshape(-1), self._start, self._offset, self.lanes, out)
+        self._sum(self._force, out)
         return least
+
+    def along(self, x: np.ndarray, laws: Sequence[Law], j_bar: bool = True) -> Callable[[np.ndarray], np.ndarray]:
+        """The derivative of :meth:`force` at the positions `x`, as a function of a displacement (n, dim) [mm].
+
+        It is made by central differences, and no matrix is. What :meth:`force` has left is not touched.
+        """
+        scratch = self._apart(self._force.shape), self._apart(self.W.shape), self._apart(self.psi.shape)
+        parts = [part.elements._replace(force=force, W=W, psi=psi)
+                 for part, force, W, psi in zip(self._parts, *(arrays for _, arrays in scratch))]
+        local, step, out = scratch[0][0], DIFFERENCE * float(self.space.h.min()), np.empty((2, *x.shape))
+
+        def derivative(d: np.ndarray) -> np.ndarray:
+            greatest = float(np.abs(d).max())
+            if greatest == 0.0:
+                return np.zeros_like(d)
+            for sign, force in zip((1.0, -1.0), out):
+                for number, (law, part, elements) in enumerate(zip(laws, self._parts, parts)):
+                    self._share(part.loops, number, law.psi.address, law.constants, Volumetric(law.bulk_modulus, j_bar),
+                                x + sign * step / greatest * d, elements)
+                self._sum(local, force)
+            change: np.ndarray = (out[0] - out[1]) * (greatest / (2.0 * step))
+            return change
+
+        return derivative
+
+    def _apart(self, shape: tuple[int, ...]) -> tuple[np.ndarray, list[np.ndarray]]:
+        """An array over all tiles, and its part for each material."""
+        whole: np.ndarray = np.zeros(shape)
+        ends = np.cumsum([len(part.elements.conn) for part in self._parts])
+        return whole, np.split(whole, ends[:-1])
 
     def viscous_force(self, x: np.ndarray, v: np.ndarray, laws: Sequence[Viscous], out: np.ndarray) -> float:
         """Viscous force at positions `x` and velocities `v` (n, dim) [mm; mm/s] into `out` (n, dim) [N, or N/mm in 2D].
@@ -179,18 +215,18 @@ class Tiles:
         0 without bulk viscosity. What :meth:`force` has left is not touched.
         """
         if self._viscous is None:
-            force, first, parts = np.empty_like(self._force), 0, []
-            for part in self._parts:
-                end = first + len(part.elements.conn)
-                parts.append(part.elements._replace(force=force[first:end]))
-                first = end
-            self._viscous = force, parts
+            force, shares = self._apart(self._force.shape)
+            self._viscous = force, [part.elements._replace(force=own) for part, own in zip(self._parts, shares)]
         force, parts = self._viscous
         greatest = 0.0
         for number, (law, elements) in enumerate(zip(laws, parts)):
             greatest = max(greatest, *self._share(VISCOUS[self.space.dim], number, law, x, v, elements))
-        _sum_at_nodes(force.reshape(-1), self._start, self._offset, self.lanes, out)
+        self._sum(force, out)
         return greatest
+
+    def _sum(self, local: np.ndarray, out: np.ndarray) -> None:
+        """Sum at the nodes (n, dim) of what the elements have there."""
+        self._share(SUMS, 0, local.reshape(-1), self._start, self._offset, np.uint32(self.lanes), out)
 
     def _share(self, loops: Loops, part: int, *arguments: object) -> list[float]:
         """What the shares of a loop return, from one thread or several, whichever was faster when last compared."""
@@ -233,21 +269,3 @@ def _in_tiles(values: np.ndarray, lanes: int) -> np.ndarray:
     """(m, rows) as tiles (-(-m // lanes), rows, lanes), filled up with the last row."""
     full = np.concatenate([values, np.repeat(values[-1:], -len(values) % lanes, axis=0)])
     return np.ascontiguousarray(full.reshape(len(full) // lanes, lanes, -1).transpose(0, 2, 1))
-
-
-@njit(cache=True)
-def _sum_at_nodes(local, start, offset, lanes, out):  # type: ignore[no-untyped-def]
-    n, dim = out.shape
-    two = np.uint32(2 * lanes)
-    for a in range(n):
-        f0, f1, f2 = 0.0, 0.0, 0.0
-        for k in range(start[a], start[a + 1]):
-            at = offset[k]
-            f0 += local[at]
-            f1 += local[at + np.uint32(lanes)]
-            if dim == 3:
-                f2 += local[at + two]
-        out[a, 0] = f0
-        out[a, 1] = f1
-        if dim == 3:
-            out[a, 2] = f2
