@@ -7,17 +7,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bodies import box
+from bodies import box, pulled
 from plates import SMALL, invoke
 
+import skfsink as sk
 from skfsink.errors import ConvergenceError, ParameterError
+from skfsink.fem import linear as linear_module
 from skfsink.fem.direct import BACKENDS, Factorization
-from skfsink.fem.linear import LINEAR, solver
+from skfsink.fem.linear import LINEAR, linear_for, solver
 from skfsink.fem.multigrid import Multigrid, rigid_motions
 from skfsink.fem.pattern import Pattern
 from skfsink.fem.space import Space
 from skfsink.fields.momentum import Momentum
-from skfsink.material import AAA
+from skfsink.material import AAA, SinkLaw
+from skfsink.methods.controls import StaticsControls
 from skfsink.methods.newton import Newton
 from skfsink.results.history import History
 
@@ -124,10 +127,32 @@ def test_a_body_is_loaded_to_the_same_onset(name: str, mesh: Path, tmp_path: Pat
     assert rows[1] == pytest.approx(rows[0], rel=1e-6)
 
 
+def test_solver_follows_the_size(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+                                 capsys: pytest.CaptureFixture[str]) -> None:
+    """Fails if a large solid gets factors by default, a small or plane one none, or what is asked for is not taken."""
+    block, plate = box("hex", 6, 0.0), box("quad", 6, 0.0)
+    assert linear_for("auto", block) == "direct"
+    monkeypatch.setattr(linear_module, "SMALL", 0)
+    monkeypatch.setattr(linear_module, "LARGE_FACTORS", 7.21e-8 * block.factor_entries)
+    assert linear_for("auto", block) == "direct"
+    monkeypatch.setattr(linear_module, "LARGE_FACTORS", 7.19e-8 * block.factor_entries)
+    large = "petsc-gamg" if HAS_PETSC else "multigrid"
+    assert [linear_for(asked, body) for asked, body in (("auto", block), ("direct", block), ("auto", plate))] == [
+        large, "direct", "direct"]
+    assert Newton.of(pulled(block, SinkLaw()).body, StaticsControls()).solver.exact is False
+    monkeypatch.setattr(linear_module, "LARGE_FACTORS", 0.0)
+    thick = tmp_path / "thick.vtu"
+    sk.write_mesh(thick, sk.grid_mesh(*[np.linspace(0.0, 1.0, 4)] * 3))
+    sk.custom(mesh=thick, grips=[sk.Grip("top", (0, 1e-3, 0)), sk.Grip("bottom", (0, 0, 0))], event_time=1e-7,
+              out=tmp_path / "run")
+    assert f"equilibria by {large}, which suits 192 displacements better than factors do; linear = 'direct' takes " \
+        "these" in "".join(capsys.readouterr())
+
+
 def test_words_that_are_none(tmp_path: Path) -> None:
     """Fails if an unknown solver is taken, or a missing PETSc is found out late."""
     status, said, _ = invoke("--linear", "lu", "--out", tmp_path / "run")
-    names = "direct, pardiso, cholmod, superlu, multigrid, petsc-gamg, petsc-mumps"
+    names = "auto, direct, pardiso, cholmod, superlu, multigrid, petsc-gamg, petsc-mumps"
     assert (status, said) == (2, f"skfsink: linear must be one of {names}; got 'lu'\n")
     if not HAS_PETSC:
         space = box("quad", 3)

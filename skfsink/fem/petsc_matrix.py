@@ -22,7 +22,7 @@ from .space import Space
 if TYPE_CHECKING:
     from mpi4py import MPI
 
-__all__ = ["MUMPS", "PETSC", "Matrix", "check"]
+__all__ = ["GAMG", "MUMPS", "PETSC", "Matrix", "check", "is_there"]
 
 PETSC = GAMG, MUMPS = "petsc-gamg", "petsc-mumps"  #: names of solvers, which solve on all ranks
 CHUNK = 200_000   # rows whose values are given to PETSc at once
@@ -36,6 +36,15 @@ def check(name: str) -> None:
             import petsc4py  # noqa: F401
         except ImportError as error:
             raise _missing(name, error) from None
+
+
+def is_there() -> bool:
+    """Whether PETSc can be had here."""
+    try:
+        check(GAMG)
+    except ParameterError:
+        return False
+    return True
 
 
 def _missing(name: str, why: object) -> ParameterError:

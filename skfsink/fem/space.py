@@ -25,6 +25,7 @@ import skfem
 from scipy.sparse import csr_array
 
 from ..errors import MeshError, place_text
+from .dissection import factor_entries
 from .exchange import ALONE, Exchange
 from .graph import adjacency, incidence, node_key
 from .interpolation import at_gauss, lump, slopes
@@ -186,6 +187,11 @@ class Space:
     def V(self) -> np.ndarray:
         """Referential volume (area in the plane) of the elements [mm^volume_dim], (ne,)."""
         return self.w.sum(axis=1)
+
+    @cached_property
+    def factor_entries(self) -> float:
+        """Entries of the factor of a matrix of the nodes, with one unknown each; see :mod:`.dissection`."""
+        return factor_entries(self.conn, self.X)
 
     @cached_property
     def extent(self) -> np.ndarray:

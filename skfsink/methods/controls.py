@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from ..errors import ParameterError, choose, require
-from ..fem.linear import LINEAR
+from ..fem.linear import AUTO, LINEAR
 
 __all__ = ["COUPLINGS", "DEBRIS", "MASSES", "EventControls", "ExplicitControls", "HHTControls", "StaticsControls"]
 
@@ -132,7 +132,7 @@ class StaticsControls:
     onset_tolerance: width of the last bisection interval of the onset, relative to the load, in (0, 0.1].
     max_newton: Newton steps after which an equilibrium is given up, >= 3.
     max_passes: passes over the two fields after which a load increment is given up, >= 3.
-    linear: what solves for displacements, a name in :data:`.LINEAR`.
+    linear: what solves for displacements, a name in :data:`.LINEAR`, or "auto"; see :func:`.linear_for`.
     """
 
     tolerance: float = 1e-7
@@ -142,7 +142,7 @@ class StaticsControls:
     onset_tolerance: float = 5e-4
     max_newton: int = 40
     max_passes: int = 80
-    linear: str = "direct"
+    linear: str = AUTO
 
     def __post_init__(self) -> None:
         require("static_tolerance", self.tolerance, low=0, high=0.01, low_open=True)
@@ -152,7 +152,7 @@ class StaticsControls:
         require("onset_tolerance", self.onset_tolerance, low=0, high=0.1, low_open=True)
         require("max_newton", self.max_newton, low=3, whole=True)
         require("max_passes", self.max_passes, low=3, whole=True)
-        choose("linear", self.linear, LINEAR)
+        choose("linear", self.linear, (AUTO, *LINEAR))
 
 
 class EventControls(Protocol):

@@ -18,7 +18,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from ..errors import ConvergenceError
-from ..fem.linear import Solver, solver
+from ..fem.linear import Solver, linear_for, solver
 from ..fem.pattern import Pattern
 from ..fields.body import Body
 from ..fields.momentum import Momentum
@@ -83,7 +83,7 @@ class Newton:
     def of(cls, body: Body, controls: StaticsControls) -> Self:
         """That of a body."""
         return cls(body.momentum, body.free, controls.tolerance, controls.max_newton, body.threads,
-                   linear=controls.linear)
+                   linear=linear_for(controls.linear, body.space))
 
     def equilibrium(self, u: np.ndarray, tolerance: float | None = None, most: int | None = None,
                     nearby: bool = False) -> tuple[np.ndarray, np.ndarray]:

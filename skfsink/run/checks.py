@@ -21,7 +21,7 @@ from ..scene.scene import Scene
 from .checks_of_events import refuse_events, warn_of_events
 from .checks_of_material import refuse_material, warn_of_material
 
-__all__ = ["check_size", "refuse", "warn"]
+__all__ = ["check_size", "is_viscous", "refuse", "warn"]
 
 log = logging.getLogger(__name__)
 
@@ -134,12 +134,13 @@ def warn(scene: Scene, folder: Path) -> None:
                         place_text(space.X[bare[0]]))
     if scene.controls.dynamic:
         warn_of_events(scene, loading, folder)
-    elif _is_viscous(scene):
+    elif is_viscous(scene):
         log.warning("viscosity has no effect in a quasi-static analysis, which has no velocities: take "
                     "analysis = 'dynamic', or leave it out")
 
 
-def _is_viscous(scene: Scene) -> bool:
+def is_viscous(scene: Scene) -> bool:
+    """Whether something in a scene is viscous."""
     c = scene.controls
     return bool(c.bulk_viscosity_linear or c.bulk_viscosity_quadratic
                 or any(part.material.viscosity for part in scene.parts))

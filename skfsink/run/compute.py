@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import CheckpointError, Interrupted, ParameterError, SkfsinkError, first_line
+from ..fem.linear import AUTO
 from ..fields.state import State
 from ..meshing.kept_mesh import MESH, keep_mesh
 from ..methods.ranks.integrator import RankOptions, ranks_text
@@ -38,7 +39,7 @@ from ..system.files import path_of, prepare_folder
 from .checkpoint import load_checkpoint, load_state
 from .checks import refuse
 from .display import Display
-from .memory import check_memory
+from .memory import check_memory, has_statics, linear_of
 from .observers.observer import Observer, Observers
 from .observers.onset import Strength
 from .observers.probe_surfaces import probes_of
@@ -191,7 +192,7 @@ def _check(scene: Scene, job: _Job) -> None:
         _copied(job.observers)
     check_memory(scene, job.display)
     c = scene.controls
-    refuse_on_ranks(scene, c.analysis, c.integrator, c.statics.linear, job.ranks.partition, c.explicit.subcycled)
+    refuse_on_ranks(scene, c.analysis, c.integrator, linear_of(scene), job.ranks.partition, c.explicit.subcycled)
     if c.series == "vtkhdf":
         check_h5py()
         if job.ranks.frame_pieces:
@@ -319,9 +320,12 @@ def _announce(simulation: Simulation, job: _Job) -> None:
     space = scene.sample.space
     for text in scene.sample.notes:
         job.display.say(f"note: {text}")
-    if ranks := ranks_text(scene.controls.analysis, scene.controls.integrator,
-                            scene.controls.statics.linear):
+    linear = linear_of(scene)
+    if ranks := ranks_text(scene.controls.analysis, scene.controls.integrator, linear):
         job.display.say(ranks)
+    if scene.controls.statics.linear == AUTO and linear != "direct" and has_statics(scene):
+        job.display.say(f"equilibria by {linear}, which suits {space.X.size} displacements better than factors do; "
+                        f"linear = 'direct' takes these")
     job.display.say(f"{scene.title}, mesh {scene.sample.name}: {space.n_elements} elements, "
                     f"{int(simulation.free.sum())} + {space.n_nodes} unknowns; {scene.controls.analysis} analysis in "
                     f"{job.folder}")

@@ -11,31 +11,35 @@ import numpy as np
 import psutil
 
 from ..errors import ParameterError, require
+from ..fem.linear import linear_for
 from ..fem.space import Space
+from ..methods.step_length import StepLength
 from ..scene.scene import Scene
+from .checks import is_viscous
 from .display import Display
 
-__all__ = ["LIMIT", "available", "check_memory", "estimate", "factor_entries"]
+__all__ = ["LIMIT", "available", "check_memory", "estimate", "has_statics", "linear_of"]
 
 LIMIT = "SKFSINK_MEMORY_GB"  #: environment variable: memory that a run may use [GB], instead of what is found
-LEAF = 60           # elements that dissection does not divide further
 WORTH_SAYING = 1.0  # GB
 # Peaks of the committed reference runs, 0.6 to 3.0 GB, are met within a factor of 1.25 by these:
 PROGRAM = 0.35                       # GB, with its libraries
 PER_ELEMENT = {2: 19e-6, 3: 10e-6}   # GB, fields, matrices, pictures
 FACTORS = 1.25                       # of the matrix of equilibrium: more than one where it is not positive definite too
-MULTIGRID = {2: 5e-6, 3: 26e-6}      # GB, hierarchy and whole matrix in the place of factors, of large bodies
-WITHOUT_FACTORS = "multigrid", "petsc-gamg"  # values of `linear`
+NO_MATRIX = 4.5e-6                   # GB, an element of a large solid less, whose explicit steps need no matrix
+#: by value of `linear`: GB an element, hierarchy and whole matrix in the place of factors, of large bodies
+HIERARCHIES = {"multigrid": {2: 5e-6, 3: 26e-6}, "petsc-gamg": {2: 5e-6, 3: 10e-6}}
 
 
-def estimate(space: Space, statics: bool = True, linear: str = "direct") -> float:
+def estimate(space: Space, statics: bool = True, linear: str = "direct", viscous: bool = False) -> float:
     """Greatest memory [GB] that a run on this mesh takes, of the whole process; without `statics` it has no factors."""
     bare = float(PROGRAM + PER_ELEMENT[space.dim] * space.n_elements)
     if not statics:
-        return bare
-    if linear in WITHOUT_FACTORS:
-        return bare + MULTIGRID[space.dim] * space.n_elements
-    entries = factor_entries(space) if space.dim == 3 else 4.5 * space.n_nodes * np.log2(space.n_nodes)
+        large = space.dim == 3 and space.X.size > StepLength.ASSEMBLED and not viscous
+        return bare - NO_MATRIX * space.n_elements * large
+    if linear in HIERARCHIES:
+        return bare + HIERARCHIES[linear][space.dim] * space.n_elements
+    entries = space.factor_entries if space.dim == 3 else 4.5 * space.n_nodes * np.log2(space.n_nodes)
     return float(bare + FACTORS * 8e-9 * space.dim**2 * entries)
 
 
@@ -63,8 +67,8 @@ def check_memory(scene: Scene, display: Display) -> None:
         It is more than there is.
     """
     space, there = scene.sample.space, available()
-    linear, statics = scene.controls.statics.linear, scene.event_at > 0.0 or scene.controls.integrator != "explicit"
-    needed = estimate(space, statics, linear)
+    linear, statics = linear_of(scene), has_statics(scene)
+    needed = estimate(space, statics, linear, is_viscous(scene))
     if needed > there:
         cure = f"take a coarser mesh or a larger machine, or set {LIMIT} to what it may use"
         if statics and (less := estimate(space, True, "multigrid")) < there:
@@ -73,6 +77,16 @@ def check_memory(scene: Scene, display: Display) -> None:
                              f"there are {there:.1f} GB; {cure}")
     if needed >= WORTH_SAYING:
         display.say(f"the run will need about {needed:.1f} GB of memory; there are {there:.1f} GB")
+
+
+def linear_of(scene: Scene) -> str:
+    """What solves for the equilibria of a scene, a name in :data:`.LINEAR`."""
+    return linear_for(scene.controls.statics.linear, scene.sample.space)
+
+
+def has_statics(scene: Scene) -> bool:
+    """Whether a scene has equilibria or implicit steps."""
+    return scene.event_at > 0.0 or scene.controls.integrator != "explicit"
 
 
 def _groups() -> list[Path]:
@@ -85,29 +99,3 @@ def _groups() -> list[Path]:
                 inner = Path(path.lstrip("/"))
                 found += [root / kinds / part for part in (inner, *inner.parents)]
     return found
-
-
-def factor_entries(space: Space, elements: np.ndarray | None = None, done: np.ndarray | None = None) -> float:
-    """Entries of the Cholesky factor of a scalar matrix on the mesh, ordered by nested dissection.
-
-    The elements are halved across their longest extent again and again; the nodes that two halves share are the
-    separator, eliminated after both, together with the separators around them.
-    """
-    if elements is None or done is None:
-        elements, done = np.arange(space.n_elements), np.zeros(space.n_nodes, bool)
-    conn = space.conn[elements]
-    nodes = np.unique(conn)
-    around = int(done[nodes].sum())
-    if len(elements) <= LEAF:
-        inner = len(nodes) - around
-        return inner * (inner / 2 + around)
-    middle = space.X[conn].mean(axis=1)
-    order = np.argsort(middle[:, np.ptp(middle, axis=0).argmax()], kind="stable")
-    halves = elements[order[:len(order) // 2]], elements[order[len(order) // 2:]]
-    shared = np.intersect1d(space.conn[halves[0]], space.conn[halves[1]])
-    shared = shared[~done[shared]]
-    inner = len(shared)
-    done[shared] = True
-    below = sum(factor_entries(space, half, done) for half in halves)
-    done[shared] = False
-    return below + inner * (inner / 2 + around)

@@ -133,9 +133,10 @@ class Options:
     front
         Quasi-static: a pass fails the points with at least this share of the greatest stored energy, in [0, 1].
     linear
-        Statics: "direct" (factors: by "pardiso", "cholmod" or "superlu", the first that is installed, or one of these
-        by name) or "petsc-mumps" (factors), or conjugate gradients with the hierarchies "multigrid" or "petsc-gamg",
-        for bodies whose factors are too large; those of PETSc are computed by all ranks.
+        Statics: "auto" (by the size of the body), "direct" (factors: by "pardiso", "cholmod" or "superlu", the first
+        that is installed, or one of these by name) or "petsc-mumps" (factors), or conjugate gradients with the
+        hierarchies "multigrid" or "petsc-gamg", for bodies whose factors are too large; those of PETSc are computed by
+        all ranks.
     element
         "jbar" (element-constant J̄), "plain" (standard Q1, locks), "planestress" (thin sheet with free faces, in 2D) or
         "axisymmetric" (body of revolution about the y axis, J̄; a 2D mesh at x >= 0; figures are of the whole body).

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import ConvergenceError, ParameterError
-from ...fem.linear import Solver
+from ...fem.linear import Solver, linear_for
 from ...fem.petsc import Petsc
 from ...fem.petsc_matrix import PETSC
 from ...fields.body import Body, BodyControls
@@ -26,7 +26,7 @@ __all__ = ["NewtonInParts", "check_statics", "statics_of"]
 def statics_of(body: Body, controls: StaticsControls) -> Statics:
     """Statics of a body; with PETSc its tangents are those of all ranks that there are."""
     comm = world()
-    if comm is None or controls.linear not in PETSC:
+    if comm is None or linear_for(controls.linear, body.space) not in PETSC:
         return Statics(body, controls)
     newton = NewtonInParts.of(body, controls)
     newton.lead(body, Crew(comm))
