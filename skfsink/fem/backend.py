@@ -45,8 +45,8 @@ class MomentumBackend(Protocol):
 
     Values at the Gauss points may have a layout of the backend's own: `tile` and `untile` go there and back.
 
-    Memory: the relative density last given to `set_gamma` or `relax`, of which `force`, `viscous_force` and `stiffest`
-    are; `W`, `energy` and `mean_force` are of the last `force`.
+    Memory: the relative density last given to `set_gamma` or `relax`, of which `force`, `along`, `viscous_force` and
+    `stiffest` are; `W`, `energy` and `mean_force` are of the last `force`.
 
     Attributes
     ----------

@@ -33,8 +33,8 @@ class FollowerLoads:
     Memory: the load time last given to `at`; the facets that bear load, of the density last given to `keep`; the
     displacement last given to `add_force` or `size`, at which the volume below a facet that fails is kept; what `hold`
     has added to fluids; in a part of a body, its space last given to `on`. `of_part`, `check_closed`, `pressures`,
-    `work`, `add_stiffness`, `skew`, `stiffening`, `stiffest`, `swept`, `area`, `idle` and `nodes` are for these;
-    `memory` gives what a checkpoint needs, and `restore` takes it up.
+    `work`, `add_stiffness`, `along`, `skew`, `stiffening`, `stiffest`, `swept`, `area`, `idle` and `nodes` are for
+    these; `memory` gives what a checkpoint needs, and `restore` takes it up.
 
     Parameters
     ----------

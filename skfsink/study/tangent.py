@@ -63,7 +63,8 @@ class _Solve:
             words = [mpiexec, "-n", str(self.ranks), *words]
         done = subprocess.run(words, capture_output=True, text=True, check=False)
         if done.returncode:
-            raise ConvergenceError((done.stderr.strip().splitlines() or ["no message"])[-1])
+            said = [line for line in done.stderr.splitlines() if any(map(str.isalnum, line))]
+            raise ConvergenceError((said or ["no message"])[-1])
         found = json.loads(done.stdout.strip().splitlines()[-1])
         return {"ranks": self.ranks, **found}
 
@@ -104,15 +105,19 @@ def label(way: tuple[str, int, int], found: list[dict[str, Any]], value: Callabl
 
 def draw(points: Points, path: Path) -> None:
     """Time, iterations and memory against the unknowns."""
-    with page(path, "The tangent of a notched block of hexahedra, stretched by 10 %", 1, 3, 2.8) as axes:
+    with page(path, "The tangent of a notched block of hexahedra, stretched by 10 %", 1, 3, 3.9) as axes:
         for ax, (title, value) in zip(axes, VALUES.items()):
             for way in WAYS:
                 found = family(points, way)
                 if found and not (title.startswith("iterations") and way[0] in ("direct", "petsc-mumps")):
-                    ax.loglog([p["unknowns"] for p in found], [value(p) for p in found], "o-", ms=2.5, lw=0.9,
-                              color=COLOURS[way], label=label(way, found, value))
-            ax.set(xlabel="unknowns", ylabel=title)
-            ax.legend(fontsize=6)
+                    ax.plot([p["unknowns"] for p in found], [value(p) for p in found], "o-", ms=2.5, lw=0.9,
+                            color=COLOURS[way], label=label(way, found, value))
+            ax.set(xlabel="unknowns", ylabel=title, xscale="log")
+            if title.startswith("iterations"):
+                ax.set_ylim(bottom=0)
+            else:
+                ax.set_yscale("log")
+            ax.legend(fontsize=6, loc="upper center", bbox_to_anchor=(0.5, -0.2))
 
 
 def table(points: Points) -> list[str]:

@@ -249,4 +249,4 @@ def draw_cavitation(points: Points, path: Path) -> None:
             ax.set(xlabel="stretch of the hole", ylabel="tension outside (MPa)", title=kind)
             if points:
                 ax.set(xlim=(1, None), ylim=(0, None))
-                ax.legend(fontsize=6, loc="lower right")
+                ax.legend(fontsize=6, loc="best")

@@ -57,9 +57,9 @@ class _Part(NamedTuple):
 class Tiles:
     """Tiled copy of a space's geometry, and the internal force evaluated on it.
 
-    Memory: the densities last given to `set_gamma` or `relax`, of which `force`, `viscous_force` and `volumetric` are,
-    and the results of the last evaluation; `tile`, `untile`, `set_gamma` and `relax` depend on no earlier call but for
-    the energy that `relax` returns, which is of the last evaluation.
+    Memory: the densities last given to `set_gamma` or `relax`, of which `force`, `along`, `viscous_force` and `volumetric`
+    are, and the results of the last evaluation; `tile`, `untile`, `set_gamma` and `relax` depend on no earlier call but
+    for the energy that `relax` returns, which is of the last evaluation.
 
     Attributes
     ----------
