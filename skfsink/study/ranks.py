@@ -166,7 +166,7 @@ class Costs:
 def draw(points: Points, path: Path) -> None:
     """Time of a step against the ranks, how much faster they are than one, and what the model says of more of them."""
     cores, costs = os.cpu_count() or 1, Costs.fitted(points)
-    with page(path, "An explicit event on several ranks", 1, 3, 2.5) as axes:
+    with page(path, "An explicit event on several ranks", 1, 3, 3.8) as axes:
         if costs is not None:
             ranks = np.logspace(0, 5, 60)
             for body, style in zip(BODIES, ("--", "-")):
@@ -187,7 +187,7 @@ def draw(points: Points, path: Path) -> None:
         axes[0].set(xlabel="ranks", ylabel="time of a step (ms)")
         axes[1].set(xlabel="ranks", ylabel="times as fast as one")
         for ax in axes:
-            ax.legend(fontsize=6)
+            ax.legend(fontsize=6, loc="upper center", bbox_to_anchor=(0.5, -0.2))
 
 
 def table(points: Points) -> list[str]:
