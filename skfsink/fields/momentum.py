@@ -32,9 +32,9 @@ class Momentum:
 
     Memory: the density last given to `set_gamma` and the load time last given to `set_time`: `force`, `tangent`,
     `along`, `stiffest`, `viscous_force`, `viscous_tangent`, `lumped_mass` and `consistent_mass` are for these.
-    `potential`, `W`, `energy` and `pressed` are of the last `force`, `compression` of the last `viscous_force`. `contact`
-    is set once; `book_contact` and `memory` are of what it has seen, and `restore` takes up the last. `pressure_work`,
-    `load_size`, `added_stiffness` and `skew_stiffness` are for the load time last given.
+    `potential`, `W`, `energy` and `pressed` are of the last `force`, `compression` of the last `viscous_force`.
+    `contact` is set once; `book_contact` and `memory` are of what it has seen, and `restore` takes up the last.
+    `pressure_work`, `load_size`, `added_stiffness` and `skew_stiffness` are for the load time last given.
 
     Parameters
     ----------

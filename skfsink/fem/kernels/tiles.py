@@ -12,7 +12,6 @@ Bytes an explicit step has to move for one quadrilateral (hexahedron): 16 (32) c
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
@@ -32,7 +31,6 @@ from .shared import FORCES, GENERAL_FORCES, VISCOUS, VOLUMETRIC, Loops
 
 __all__ = ["Law", "Tiles"]
 
-AWAKE = 3_000_000  # turns for which a thread waits for the next loop before it sleeps: some milliseconds
 DIFFERENCE = 1e-6  # of the smallest element: displacement of a central difference of forces, at the most
 
 class Law(NamedTuple):
@@ -57,9 +55,9 @@ class _Part(NamedTuple):
 class Tiles:
     """Tiled copy of a space's geometry, and the internal force evaluated on it.
 
-    Memory: the densities last given to `set_gamma` or `relax`, of which `force`, `along`, `viscous_force` and `volumetric`
-    are, and the results of the last evaluation; `tile`, `untile`, `set_gamma` and `relax` depend on no earlier call but
-    for the energy that `relax` returns, which is of the last evaluation.
+    Memory: the densities last given to `set_gamma` or `relax`, of which `force`, `along`, `viscous_force` and
+    `volumetric` are, and the results of the last evaluation; `tile`, `untile`, `set_gamma` and `relax` depend on no
+    earlier call but for the energy that `relax` returns, which is of the last evaluation.
 
     Attributes
     ----------
@@ -100,8 +98,6 @@ class Tiles:
         self._whole = Elements(self.conn, self.geometry, self.gamma, none, self._force, self.W, self.psi)
         most: int = numba.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]
         self.threads = 1 if space.w.size < self.WORTH else min(threads, most)
-        if self.threads > 1:  # read by GNU's OpenMP as it is loaded
-            os.environ.setdefault("GOMP_SPINCOUNT", str(AWAKE))
         self._faster: dict[object, Faster] = {}
         self._viscous: tuple[np.ndarray, list[Elements]] | None = None
         start, entry = space.incidence
