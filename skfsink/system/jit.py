@@ -16,13 +16,12 @@ from pathlib import Path
 from typing import Any
 
 import numba
-from numba import prange
 from numba.core import caching, config
 from numba.misc.appdirs import AppDirs
 
 from .scratch import first_writable, temporary_folder
 
-__all__ = ["njit", "prange", "sources", "stamp"]
+__all__ = ["njit", "sources", "stamp"]
 
 #: "from ..space import Space, Pattern" at the top level of a module, with dots, module and names
 _IMPORT = re.compile(r"^from[ \t]+(\.+)([\w.]*)[ \t]+import[ \t]+(?:\(([^)]*)\)|([^\n#]*))", re.MULTILINE)

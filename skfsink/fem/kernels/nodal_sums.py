@@ -1,18 +1,41 @@
-"""Sums at the nodes of what the elements have there, by one thread or several; no sum depends on how many."""
+"""Sums at the nodes of what the elements have there."""
 
 from __future__ import annotations
 
-from ...system.jit import njit, prange
+from typing import NamedTuple
 
-__all__ = ["SUMS"]
+import numpy as np
+
+from ...system.jit import njit
+
+__all__ = ["Sums", "sum_at_nodes"]
 
 
-@njit
-def _sums(local, start, offset, lanes, out, first, last):  # type: ignore[no-untyped-def]
-    """Of the nodes from `first` to `last`: entries of node a begin at start[a], component i of one i lanes on."""
-    dim = out.shape[1]
+class Sums(NamedTuple):
+    """Nodes, and where their sums go.
+
+    Attributes
+    ----------
+    start: where the entries of each node begin, and where those of the last one end, (n+1,).   out: sums (n, dim).
+    """
+
+    start: np.ndarray
+    out: np.ndarray
+
+    def share(self, s: int, shares: int) -> Sums:
+        """Share number `s` of `shares`: a run of neighbouring nodes."""
+        n = len(self.out)
+        a, b = n * s // shares, n * (s + 1) // shares
+        return Sums(self.start[a:b + 1], self.out[a:b])
+
+
+@njit(cache=True, nogil=True)
+def sum_at_nodes(local, offset, lanes, nodes):  # type: ignore[no-untyped-def]
+    """Add the entries `offset` of what is `local`; component i of an entry is i lanes on."""
+    start, out = nodes.start, nodes.out
+    n, dim = out.shape
     two = 2 * lanes
-    for a in range(first, last):
+    for a in range(n):
         f0, f1, f2 = 0.0, 0.0, 0.0
         for k in range(start[a], start[a + 1]):
             at = offset[k]
@@ -24,21 +47,4 @@ def _sums(local, start, offset, lanes, out, first, last):  # type: ignore[no-unt
         out[a, 1] = f1
         if dim == 3:
             out[a, 2] = f2
-
-
-@njit(cache=True)
-def _alone(local, start, offset, lanes, out):  # type: ignore[no-untyped-def]
-    _sums(local, start, offset, lanes, out, 0, out.shape[0])
     return 0.0
-
-
-@njit(cache=True, parallel=True)
-def _shared(local, start, offset, lanes, out, returned):  # type: ignore[no-untyped-def]
-    shares, n = returned.size, out.shape[0]
-    for s in prange(shares):
-        _sums(local, start, offset, lanes, out, n * s // shares, n * (s + 1) // shares)
-        returned[s] = 0.0
-
-
-#: for one thread, and for several; see :mod:`.shared`
-SUMS = _alone, _shared

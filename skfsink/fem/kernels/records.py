@@ -6,9 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...system.jit import njit
-
-__all__ = ["Elements", "Piece", "Solid", "Viscous", "Volumetric", "share"]
+__all__ = ["Elements", "Piece", "Solid", "Viscous", "Volumetric"]
 
 
 class Elements(NamedTuple):
@@ -33,6 +31,12 @@ class Elements(NamedTuple):
     force: np.ndarray
     W: np.ndarray
     psi: np.ndarray
+
+    def share(self, s: int, shares: int) -> Elements:
+        """Share number `s` of `shares`: a run of neighbouring tiles."""
+        n = len(self.conn)
+        part = slice(n * s // shares, n * (s + 1) // shares)
+        return Elements(*(array[part] for array in self))
 
 
 class Volumetric(NamedTuple):
@@ -85,12 +89,3 @@ class Piece(NamedTuple):
     slot: np.ndarray
     fibres: np.ndarray
     around: np.ndarray
-
-
-@njit
-def share(elements, s, shares):  # type: ignore[no-untyped-def]
-    """Share number `s` of `shares`: a run of neighbouring tiles."""
-    n = elements.conn.shape[0]
-    a, b = n * s // shares, n * (s + 1) // shares
-    return Elements(elements.conn[a:b], elements.geometry[a:b], elements.gamma[a:b], elements.fibres[a:b],
-                    elements.force[a:b], elements.W[a:b], elements.psi[a:b])

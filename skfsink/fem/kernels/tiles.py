@@ -13,6 +13,8 @@ Bytes an explicit step has to move for one quadrilateral (hexahedron): 16 (32) c
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 from typing import NamedTuple
 
 import numba
@@ -23,13 +25,15 @@ from ..space import Space
 from .faster import Faster
 from .general_sheet_tangent import stiffness_general_sheet
 from .lanes import LANES, LANES_3D
-from .nodal_sums import SUMS
+from .loops import FORCES, GENERAL_FORCES, VISCOUS, VOLUMETRIC
+from .nodal_sums import Sums, sum_at_nodes
 from .plane_stress import stiffness_plane_stress
 from .records import Elements, Viscous, Volumetric
 from .relax import relax
-from .shared import FORCES, GENERAL_FORCES, VISCOUS, VOLUMETRIC, Loops
 
 __all__ = ["Law", "Tiles"]
+
+Loop = Callable[..., float]
 
 DIFFERENCE = 1e-6  # of the smallest element: displacement of a central difference of forces, at the most
 
@@ -42,12 +46,12 @@ class Law(NamedTuple):
 
 
 class _Part(NamedTuple):
-    """Tiles of the elements of one material, parts of the arrays of the whole body, and the loops for them.
+    """Tiles of the elements of one material, parts of the arrays of the whole body, and the loop for their force.
 
     `stiffness` is that of plane stress alone.
     """
 
-    loops: Loops
+    loop: Loop
     elements: Elements
     stiffness: Callable[..., float]
 
@@ -90,9 +94,9 @@ class Tiles:
         for (_, fibres), a, b in zip(parts, ends[:-1], ends[1:]):
             directions = np.empty((b - a, 0, self.lanes)) if fibres is None else _in_tiles(
                 fibres.reshape(len(fibres), -1), self.lanes)
-            loops = (FORCES if fibres is None else GENERAL_FORCES)[0 if plane_stress else dim]
-            self._parts.append(_Part(loops, Elements(self.conn[a:b], self.geometry[a:b], self.gamma[a:b], directions,
-                                                     self._force[a:b], self.W[a:b], self.psi[a:b]),
+            loop = (FORCES if fibres is None else GENERAL_FORCES)[0 if plane_stress else dim]
+            self._parts.append(_Part(loop, Elements(self.conn[a:b], self.geometry[a:b], self.gamma[a:b], directions,
+                                                    self._force[a:b], self.W[a:b], self.psi[a:b]),
                                      stiffness_plane_stress if fibres is None else stiffness_general_sheet))
         none = np.empty((self.count, 0, self.lanes))
         self._whole = Elements(self.conn, self.geometry, self.gamma, none, self._force, self.W, self.psi)
@@ -169,7 +173,7 @@ class Tiles:
         """
         least = 1.0
         for number, (law, part) in enumerate(zip(laws, self._parts)):
-            least = min(least, *self._share(part.loops, number, law.psi.address, law.constants,
+            least = min(least, *self._share(part.loop, number, law.psi.address, law.constants,
                                             Volumetric(law.bulk_modulus, j_bar), x, part.elements))
         self._sum(self._force, out)
         return least
@@ -190,7 +194,7 @@ class Tiles:
                 return np.zeros_like(d)
             for sign, force in zip((1.0, -1.0), out):
                 for number, (law, part, elements) in enumerate(zip(laws, self._parts, parts)):
-                    self._share(part.loops, number, law.psi.address, law.constants, Volumetric(law.bulk_modulus, j_bar),
+                    self._share(part.loop, number, law.psi.address, law.constants, Volumetric(law.bulk_modulus, j_bar),
                                 x + sign * step / greatest * d, elements)
                 self._sum(local, force)
             change: np.ndarray = (out[0] - out[1]) * (greatest / (2.0 * step))
@@ -222,29 +226,30 @@ class Tiles:
 
     def _sum(self, local: np.ndarray, out: np.ndarray) -> None:
         """Sum at the nodes (n, dim) of what the elements have there."""
-        self._share(SUMS, 0, local.reshape(-1), self._start, self._offset, np.uint32(self.lanes), out)
+        self._share(sum_at_nodes, 0, local.reshape(-1), self._offset, np.uint32(self.lanes), Sums(self._start, out))
 
-    def _share(self, loops: Loops, part: int, *arguments: object) -> list[float]:
-        """What the shares of a loop return, from one thread or several, whichever was faster when last compared."""
-        single, shared = loops
+    def _share(self, loop: Loop, part: int, *arguments: object) -> list[float]:
+        """What the shares of a loop return, by one thread or several, whichever was faster when last compared.
+
+        A share is a run of neighbouring tiles or nodes. Threads call the very loop that one calls, so that no bit
+        depends on their number: compiled again for shares it might add in another order.
+        """
         if self.threads == 1:
-            return [float(single(*arguments))]
-        numba.set_num_threads(self.threads)
-        results = np.empty(self.threads)
-        faster = self._faster.setdefault((single, part), Faster())
-        with faster as several:
+            return [float(loop(*arguments))]
+        with self._faster.setdefault((loop, part), Faster()) as several:
             if not several:
-                return [float(single(*arguments))]
-            shared(*arguments, results)
-        return [float(result) for result in results]
+                return [float(loop(*arguments))]
+            own, *others = (_share_of(arguments, s, self.threads) for s in range(self.threads))
+            waiting = [_pool(self.threads - 1).submit(loop, *theirs) for theirs in others]
+            return [float(loop(*own)), *(float(one.result()) for one in waiting)]
 
     def volumetric(self, x: np.ndarray, bulk_moduli: Sequence[float], inverse_mass: np.ndarray) -> float:
         """Greatest k gamma_bar V |b|^2_(1/m) of an element, b = dJ_bar/du, at `x`: a frequency squared [1/s^2].
 
         `bulk_moduli` are those of the parts; `inverse_mass` (n, dim) is zero where a degree of freedom is held.
         """
-        loops = VOLUMETRIC[self.space.dim]
-        return max(k * max(self._share(loops, number, x, part.elements, inverse_mass))
+        loop = VOLUMETRIC[self.space.dim]
+        return max(k * max(self._share(loop, number, x, part.elements, inverse_mass))
                    for number, (k, part) in enumerate(zip(bulk_moduli, self._parts)))
 
     def plane_stiffness(self, x: np.ndarray, laws: Sequence[Law], inverse_mass: np.ndarray) -> float:
@@ -259,6 +264,17 @@ class Tiles:
         """
         _, rows, _ = self._force.shape
         return float(np.abs(self._force).sum()) / (rows * self.space.n_elements)
+
+
+def _share_of(arguments: tuple[object, ...], s: int, shares: int) -> list[object]:
+    """Arguments of share number `s`: of what can be shared, its share."""
+    return [x.share(s, shares) if isinstance(x, Elements | Sums) else x for x in arguments]
+
+
+@cache
+def _pool(threads: int) -> ThreadPoolExecutor:
+    """Threads beside the one that asks."""
+    return ThreadPoolExecutor(threads)
 
 
 def _in_tiles(values: np.ndarray, lanes: int) -> np.ndarray:
