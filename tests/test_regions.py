@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import dataclasses
 import logging
+import multiprocessing
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -165,6 +166,23 @@ def test_the_indicator_takes_the_stiffest_part() -> None:
         greatest.append(part.stiffest(0 * ones, ones))
     assert momentum.stiffest(0 * ones, ones) == pytest.approx(max(greatest), rel=1e-12)
     assert greatest[1] > 1.3 * greatest[0]
+
+
+@pytest.mark.skipif("fork" not in multiprocessing.get_all_start_methods(), reason="no forks here")
+@pytest.mark.filterwarnings("ignore:.*multi-threaded, use of fork:DeprecationWarning")
+def test_a_forked_process_has_threads_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fails if a forked process waits for threads that it has not."""
+    monkeypatch.setattr(kernels.Tiles, "WORTH", 0)
+    space = box("quad", 13)
+    momentum, u = Momentum(space, AAA(), threads=2), wavy(space, 0.1)
+    momentum.force(u)
+    child = multiprocessing.get_context("fork").Process(target=momentum.force, args=(u,))
+    child.start()
+    child.join(60)
+    hung = child.is_alive()
+    child.kill()
+    assert not hung
+    assert child.exitcode == 0
 
 
 def test_parts_shared_by_threads(monkeypatch: pytest.MonkeyPatch, kind: str) -> None:

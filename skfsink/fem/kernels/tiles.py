@@ -12,6 +12,7 @@ Bytes an explicit step has to move for one quadrilateral (hexahedron): 16 (32) c
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
@@ -240,7 +241,8 @@ class Tiles:
             if not several:
                 return [float(loop(*arguments))]
             own, *others = (_share_of(arguments, s, self.threads) for s in range(self.threads))
-            waiting = [_pool(self.threads - 1).submit(loop, *theirs) for theirs in others]
+            pool = _pool(self.threads - 1, os.getpid())
+            waiting = [pool.submit(loop, *theirs) for theirs in others]
             return [float(loop(*own)), *(float(one.result()) for one in waiting)]
 
     def volumetric(self, x: np.ndarray, bulk_moduli: Sequence[float], inverse_mass: np.ndarray) -> float:
@@ -272,8 +274,8 @@ def _share_of(arguments: tuple[object, ...], s: int, shares: int) -> list[object
 
 
 @cache
-def _pool(threads: int) -> ThreadPoolExecutor:
-    """Threads beside the one that asks."""
+def _pool(threads: int, process: int) -> ThreadPoolExecutor:
+    """Threads beside the one that asks, of a process: one that was forked has none of its parent's."""
     return ThreadPoolExecutor(threads)
 
 
