@@ -149,8 +149,8 @@ def test_stamps_cover_what_modules_import() -> None:
                 found |= {path for place in places for path in (place.with_name(f"{place.name}.py"),
                                                                 place / "__init__.py") if path.is_file()}
         assert found <= set(sources(file)), file
-    lanes, shared = (package / "fem" / "kernels" / name for name in ("lanes.py", "shared.py"))
-    assert lanes in sources(shared) and lanes not in sources(package / "material" / "isotropic.py")
+    lanes, loop = (package / "fem" / "kernels" / name for name in ("lanes.py", "force3d.py"))
+    assert lanes in sources(loop) and lanes not in sources(package / "material" / "isotropic.py")
 
 
 # --- where nothing can be written ---
