@@ -60,7 +60,7 @@ STEPS: dict[str, Step] = {step.name: step for step in (
            "convergence_layers.png"),
     _study("notch", 0.4, "notch.png"),
     _study("speed_accuracy", 2.5, "speed_accuracy.png", *(f"speed_accuracy_{part}.png" for part in PARTS)),
-    _study("ranks", 0.3, "ranks_scaling.png"),
+    _study("ranks", 0.8, "ranks_scaling.png"),
     _study("stability", 0.2, *(f"stability_{failure}.png" for failure in FAILURES)),
     Step("validation", ("-m", "skfsink.study.validation", "--page", "docs/validation.md"), 0.5,
          "results/study/validation", {"validation.json": "docs/images/validation.json"}

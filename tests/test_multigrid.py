@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import importlib.util
 from pathlib import Path
 
@@ -23,6 +24,7 @@ from skfsink.material import AAA, SinkLaw
 from skfsink.methods.controls import StaticsControls
 from skfsink.methods.newton import Newton
 from skfsink.results.history import History
+from skfsink.run.memory import linear_of
 
 HAS_PETSC = importlib.util.find_spec("petsc4py") is not None
 NAMES = [name for name in LINEAR if name not in ("direct", *BACKENDS) and (HAS_PETSC or "petsc" not in name)]
@@ -143,10 +145,15 @@ def test_solver_follows_the_size(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(linear_module, "LARGE_FACTORS", 0.0)
     thick = tmp_path / "thick.vtu"
     sk.write_mesh(thick, sk.grid_mesh(*[np.linspace(0.0, 1.0, 4)] * 3))
-    sk.custom(mesh=thick, grips=[sk.Grip("top", (0, 1e-3, 0)), sk.Grip("bottom", (0, 0, 0))], event_time=1e-7,
-              out=tmp_path / "run")
+    run = sk.custom(mesh=thick, grips=[sk.Grip("top", (0, 1e-3, 0)), sk.Grip("bottom", (0, 0, 0))], event_time=1e-7,
+                    out=tmp_path / "run")
     assert f"equilibria by {large}, which suits 192 displacements better than factors do; linear = 'direct' takes " \
         "these" in "".join(capsys.readouterr())
+    # an event from the unloaded body does not wait for the size of factors that it has not
+    sample = dataclasses.replace(run.scene.sample, space=Space(run.scene.sample.space.mesh))
+    assert linear_of(dataclasses.replace(run.scene, sample=sample, event_at=0.0)) == "direct"
+    assert "factor_entries" not in vars(sample.space)
+    assert linear_of(run.scene) == large
 
 
 def test_words_that_are_none(tmp_path: Path) -> None:

@@ -39,7 +39,7 @@ from ..system.files import path_of, prepare_folder
 from .checkpoint import load_checkpoint, load_state
 from .checks import refuse
 from .display import Display
-from .memory import check_memory, has_statics, linear_of
+from .memory import check_memory, linear_of
 from .observers.observer import Observer, Observers
 from .observers.onset import Strength
 from .observers.probe_surfaces import probes_of
@@ -323,7 +323,7 @@ def _announce(simulation: Simulation, job: _Job) -> None:
     linear = linear_of(scene)
     if ranks := ranks_text(scene.controls.analysis, scene.controls.integrator, linear):
         job.display.say(ranks)
-    if scene.controls.statics.linear == AUTO and linear != "direct" and has_statics(scene):
+    if scene.controls.statics.linear == AUTO and linear != "direct":
         job.display.say(f"equilibria by {linear}, which suits {space.X.size} displacements better than factors do; "
                         f"linear = 'direct' takes these")
     job.display.say(f"{scene.title}, mesh {scene.sample.name}: {space.n_elements} elements, "

@@ -11,7 +11,7 @@ import numpy as np
 import psutil
 
 from ..errors import ParameterError, require
-from ..fem.linear import linear_for
+from ..fem.linear import AUTO, linear_for
 from ..fem.space import Space
 from ..methods.step_length import StepLength
 from ..scene.scene import Scene
@@ -80,8 +80,9 @@ def check_memory(scene: Scene, display: Display) -> None:
 
 
 def linear_of(scene: Scene) -> str:
-    """What solves for the equilibria of a scene, a name in :data:`.LINEAR`."""
-    return linear_for(scene.controls.statics.linear, scene.sample.space)
+    """What solves for the equilibria of a scene, a name in :data:`.LINEAR`; for one without them no factor is sized."""
+    asked = scene.controls.statics.linear
+    return linear_for(asked, scene.sample.space) if has_statics(scene) or asked != AUTO else "direct"
 
 
 def has_statics(scene: Scene) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Mapping, Sequence
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -26,6 +27,7 @@ from .checkpoint import CHECKPOINT, load_checkpoint, save_checkpoint, save_state
 from .checks import warn
 from .cost import Cost
 from .display import Display, Interrupt
+from .memory import linear_of
 from .notes import Notes
 from .observers.crack import Crack, tracker_of
 from .observers.fragments import Fragments
@@ -97,7 +99,7 @@ class Simulation:
         self.scene, self.folder, self.display, self._ranks = scene, folder, display, ranks
         self.body = Body.of(scene)
         self.momentum, self.density, self.free = self.body.momentum, self.body.density, self.body.free
-        self.statics = statics_of(self.body, scene.controls.statics)
+        self.statics = statics_of(self.body, replace(scene.controls.statics, linear=linear_of(scene)))
         self.statics.until = scene.event_at
         self.notes = Notes(display.say, memory.get("warnings", ()))
         self.state = stored.state if stored else self.body.begin(State.intact(self.body.space))

@@ -172,10 +172,7 @@ class Tiles:
         `laws` are those of the parts. Fills `W` and `psi`, and returns the least J at a Gauss point with gamma > 0.
         `j_bar=False` takes J instead of its element mean (the plain element, which locks).
         """
-        least = 1.0
-        for number, (law, part) in enumerate(zip(laws, self._parts)):
-            least = min(least, *self._share(part.loop, number, law.psi.address, law.constants,
-                                            Volumetric(law.bulk_modulus, j_bar), x, part.elements))
+        least = self._evaluate(x, laws, j_bar, [part.elements for part in self._parts])
         self._sum(self._force, out)
         return least
 
@@ -194,14 +191,20 @@ class Tiles:
             if greatest == 0.0:
                 return np.zeros_like(d)
             for sign, force in zip((1.0, -1.0), out):
-                for number, (law, part, elements) in enumerate(zip(laws, self._parts, parts)):
-                    self._share(part.loop, number, law.psi.address, law.constants, Volumetric(law.bulk_modulus, j_bar),
-                                x + sign * step / greatest * d, elements)
+                self._evaluate(x + sign * step / greatest * d, laws, j_bar, parts)
                 self._sum(local, force)
             change: np.ndarray = (out[0] - out[1]) * (greatest / (2.0 * step))
             return change
 
         return derivative
+
+    def _evaluate(self, x: np.ndarray, laws: Sequence[Law], j_bar: bool, parts: Sequence[Elements]) -> float:
+        """Forces of the elements of all `parts`, and what the loops leave there; the least J, at the most 1."""
+        least = 1.0
+        for number, (law, part, elements) in enumerate(zip(laws, self._parts, parts)):
+            least = min(least, *self._share(part.loop, number, law.psi.address, law.constants,
+                                            Volumetric(law.bulk_modulus, j_bar), x, elements))
+        return least
 
     def _apart(self, shape: tuple[int, ...]) -> tuple[np.ndarray, list[np.ndarray]]:
         """An array over all tiles, and its part for each material."""
